@@ -1,0 +1,1 @@
+"""Assisted tracking proper: inversion, estimators, gate of readings, prediction buffer.  Pure."""

@@ -1,0 +1,1 @@
+"""The decision of every tick: state machine, lag, safety gate, replay.  Pure."""

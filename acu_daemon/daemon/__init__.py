@@ -1,0 +1,1 @@
+"""The running daemon: foreground, background, common area."""

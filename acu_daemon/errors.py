@@ -1,0 +1,43 @@
+"""The error tree.  Expected outcomes (a garbled frame, a NAK, a fit that did not converge) are values, not errors.
+
+AcuDaemonError
+├── UsageError              wrong use or configuration; exit status 2
+│   ├── ConfigError         a TOML file: says file, key, value, what was expected
+│   └── ElementsError       an element set: says file, line, reason
+├── OrbitError              a propagator has no answer (decayed, outside its span)
+├── LinkError               the connection to the ACU failed
+│   └── LinkRefusedError    another client holds the ACU, or nobody listens
+└── NoAcuError              no good poll within the start's time limit; exit status 3
+"""
+
+
+class AcuDaemonError(Exception):
+    """Base of everything this package raises on purpose."""
+
+
+class UsageError(AcuDaemonError):
+    """Wrong use: the message says what to do instead."""
+
+
+class ConfigError(UsageError):
+    """A configuration file cannot be used; the message names file, key, value and what was expected."""
+
+
+class ElementsError(UsageError):
+    """An element set cannot be used; the message names file, line and reason."""
+
+
+class OrbitError(AcuDaemonError):
+    """A propagator has no answer for the times asked."""
+
+
+class LinkError(AcuDaemonError):
+    """The connection to the ACU failed."""
+
+
+class LinkRefusedError(LinkError):
+    """The ACU's side closed at once or refused: another client holds it, or nobody listens."""
+
+
+class NoAcuError(AcuDaemonError):
+    """No good poll within the time limit of the start."""

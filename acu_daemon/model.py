@@ -1,0 +1,177 @@
+"""The frozen values that cross rooms.  Everything here is data; the rooms give it meaning.
+
+Time is TAI seconds since 2000-01-01T12:00:00 TAI, one float (0.1 us today), monotone through leap seconds.
+Angles are degrees.  Azimuth is clockwise from true north.  "Encoder frame" means as the ACU counts it.
+"""
+
+from dataclasses import dataclass
+from math import cos, radians
+from typing import Literal
+
+import numpy as np
+
+from acu_daemon.units import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Station:
+    """Where the antenna stands: geodetic, WGS84, east positive."""
+
+    name: str
+    latitude_deg: float
+    longitude_deg: float
+    height_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class EarthOrientation:
+    """What turns a quasi-inertial frame into the Earth-fixed one beyond sidereal time."""
+
+    ut1_utc_s: float = 0.0
+    polar_x_arcsec: float = 0.0
+    polar_y_arcsec: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """A station together with the Earth orientation in force."""
+
+    station: Station
+    orientation: EarthOrientation = EarthOrientation()
+
+
+@dataclass(frozen=True, slots=True)
+class AxisLimits:
+    """Soft limits and drive limits of one axis."""
+
+    min_deg: float
+    max_deg: float
+    max_rate_deg_s: float
+    max_acceleration_deg_s2: float
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One time-tagged azimuth/elevation pair from the ACU: encoder angles, azimuth in [0, 360)."""
+
+    tai_s: float
+    az_deg: float
+    el_deg: float
+    is_locked: bool  # the raw acquisition flag; the dwell is applied by whoever fits
+
+
+@dataclass(frozen=True, slots=True)
+class Readings:
+    """Readings to fit, oldest first; every array is (N,)."""
+
+    tai_s: Array
+    az_deg: Array
+    el_deg: Array
+
+    def __len__(self) -> int:
+        return int(self.tai_s.size)
+
+
+@dataclass(frozen=True, slots=True)
+class Correction:
+    """What a fit adds to the elements.
+
+    delta_raan_rad and delta_mean_anomaly_rad act on the mean elements of the source at its epoch.
+    """
+
+    delta_raan_rad: float = 0.0
+    delta_mean_anomaly_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class FitResult:
+    """One accepted fit."""
+
+    estimator: str
+    correction: Correction
+    at_tai_s: float  # time of the newest reading used
+    reading_count: int
+    rejected_count: int
+    residual_rms_deg: float  # angle on the sky, newest readings against the fit
+    along_s: float  # the correction for people: early (-) or late (+) along the track
+    across_deg: float  # and across it, seen from the station, right of the motion positive
+
+
+PredictionKind = Literal["FITTED", "TLE"]
+
+
+@dataclass(frozen=True, slots=True)
+class Pointing:
+    """A direction of the prediction at one instant."""
+
+    az_deg: float  # continuous through north, see Prediction
+    el_deg: float
+    az_rate_deg_s: float
+    el_rate_deg_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """The prediction buffer: pointing at even steps, azimuth continuous through north (may leave [0, 360)).
+
+    The arrays are (N,).  `follow_az_deg` is the path for an antenna that follows the registers: the same as `az_deg`
+    but where the azimuth drive is too slow (near the zenith), there a path it can follow (pointing.keyhole).
+    """
+
+    start_tai_s: float
+    step_s: float
+    az_deg: Array
+    el_deg: Array
+    az_rate_deg_s: Array
+    el_rate_deg_s: Array
+    follow_az_deg: Array
+    follow_az_rate_deg_s: Array
+    kind: PredictionKind
+    made_at_tai_s: float
+    sigma_deg: Array | None = None
+
+    @property
+    def end_tai_s(self) -> float:
+        return self.start_tai_s + self.step_s * (self.az_deg.size - 1)
+
+    def at(self, tai_s: float, *, follow: bool = False) -> Pointing | None:
+        """Interpolate by cubic Hermite polynomials (smooth in rate); None outside the buffer."""
+        x = (tai_s - self.start_tai_s) / self.step_s
+        if not -1e-6 <= x <= self.az_deg.size - 1 + 1e-6:
+            return None
+        i = min(max(int(x), 0), self.az_deg.size - 2)
+        az = self.follow_az_deg if follow else self.az_deg
+        az_rate = self.follow_az_rate_deg_s if follow else self.az_rate_deg_s
+        az_deg, az_rate_deg_s = _hermite(az, az_rate, i, x - i, self.step_s)
+        el_deg, el_rate_deg_s = _hermite(self.el_deg, self.el_rate_deg_s, i, x - i, self.step_s)
+        return Pointing(az_deg, el_deg, az_rate_deg_s, el_rate_deg_s)
+
+
+def _hermite(y: Array, rate: Array, i: int, u: float, h: float) -> tuple[float, float]:
+    y0, y1, d0, d1 = float(y[i]), float(y[i + 1]), float(rate[i]) * h, float(rate[i + 1]) * h
+    a, b = 2 * (y0 - y1) + d0 + d1, 3 * (y1 - y0) - 2 * d0 - d1
+    return ((a * u + b) * u + d0) * u + y0, ((3 * a * u + 2 * b) * u + d0) / h
+
+
+@dataclass(frozen=True, slots=True)
+class Pass:
+    """A geometric pass above the station's lowest elevation."""
+
+    rise_tai_s: float
+    culmination_tai_s: float
+    set_tai_s: float
+    rise_az_deg: float
+    culmination_el_deg: float
+    culmination_az_deg: float
+    set_az_deg: float
+
+    @property
+    def duration_s(self) -> float:
+        return self.set_tai_s - self.rise_tai_s
+
+
+def sky_angle_deg(az1_deg: float, el1_deg: float, az2_deg: float, el2_deg: float) -> float:
+    """Angle on the sky between two directions, well conditioned for small angles (haversine)."""
+    d_el, d_az = radians(el2_deg - el1_deg), radians(az2_deg - az1_deg)
+    h = np.sin(d_el / 2) ** 2 + cos(radians(el1_deg)) * cos(radians(el2_deg)) * np.sin(d_az / 2) ** 2
+    return float(np.degrees(2 * np.arcsin(min(1.0, float(np.sqrt(h))))))

@@ -1,0 +1,1 @@
+"""From directions on the sky to axis angles: cable wrap, keyhole plan.  Pure."""

@@ -1,0 +1,1 @@
+"""SIMULATION: the fake ACU with pedestal, receiver and sky.  Never imported by the daemon."""
