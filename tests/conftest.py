@@ -1,0 +1,25 @@
+"""What every test shares: where the real data lies, and the rule that no task may leak."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+import pytest_asyncio
+
+SHARED = Path(__file__).resolve().parents[2] / "shared"
+DATA = SHARED / "data"
+
+needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="the real data folder ../shared/data is not there")
+
+
+@pytest_asyncio.fixture(autouse=True)
+async def no_task_is_left_running(request: pytest.FixtureRequest) -> AsyncIterator[None]:
+    """Fail an asyncio test that leaves a task behind."""
+    before = asyncio.all_tasks()
+    yield
+    left = [task for task in asyncio.all_tasks() - before if not task.done()]
+    for task in left:
+        task.cancel()
+    if left:
+        pytest.fail(f"the test left tasks running: {[task.get_name() for task in left]}")
