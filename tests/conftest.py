@@ -13,9 +13,8 @@ DATA = SHARED / "data"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="the real data folder ../shared/data is not there")
 
 
-@pytest_asyncio.fixture(autouse=True)
-async def no_task_is_left_running(request: pytest.FixtureRequest) -> AsyncIterator[None]:
-    """Fail an asyncio test that leaves a task behind."""
+@pytest_asyncio.fixture
+async def _watched_tasks() -> AsyncIterator[None]:
     before = asyncio.all_tasks()
     yield
     left = [task for task in asyncio.all_tasks() - before if not task.done()]
@@ -23,3 +22,10 @@ async def no_task_is_left_running(request: pytest.FixtureRequest) -> AsyncIterat
         task.cancel()
     if left:
         pytest.fail(f"the test left tasks running: {[task.get_name() for task in left]}")
+
+
+@pytest.fixture(autouse=True)
+def _no_task_is_left_running(request: pytest.FixtureRequest) -> None:
+    """Fail an asyncio test that leaves a task behind."""
+    if request.node.get_closest_marker("asyncio"):
+        request.getfixturevalue("_watched_tasks")
