@@ -17,7 +17,7 @@ needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="the real data folder 
 async def _watched_tasks() -> AsyncIterator[None]:
     before = asyncio.all_tasks()
     yield
-    left = [task for task in asyncio.all_tasks() - before if not task.done()]
+    left = [task for task in asyncio.all_tasks() - before if not task.done() and task is not asyncio.current_task()]
     for task in left:
         task.cancel()
     if left:
