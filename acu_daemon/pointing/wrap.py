@@ -1,0 +1,107 @@
+"""Which turn of the cable wrap to stand on: chosen once for a whole pass, so that the dish never unwinds in its middle.
+
+Continuous azimuth counts on through north; the bearing is the same modulo 360.  Pure.
+"""
+
+from dataclasses import dataclass
+from math import ceil, floor
+
+import numpy as np
+
+from acu_daemon.model import AxisLimits
+from acu_daemon.units import Array, wrap_180
+
+# Above this culmination the real path may pass the zenith on the other side than predicted, and turn the other way.
+EITHER_WAY_ELEVATION_DEG = 85.0
+# The two ways differ in what happens above this; below it they have the same bearings.
+_COMMON_ELEVATION_DEG = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """The turn to take: add offset_deg (a multiple of 360) to the path.
+
+    held_fraction: how much of the path, from its start, lies within the soft limits.  holds_either_way: also the path
+    that passes the zenith on the other side (the same as holds_path where the culmination is too low for that).
+    """
+
+    offset_deg: float
+    holds_path: bool
+    holds_either_way: bool
+    held_fraction: float
+    reason: str
+
+
+def choose_turn(path_az_deg: Array, path_el_deg: Array, limits: AxisLimits, present_az_deg: float) -> Turn:
+    """Choose the turn that holds the whole path, the nearest to where the antenna stands among those that do.
+
+    path_az_deg (N,): azimuth continuous over the whole pass (or the rest of it); path_el_deg (N,): elevations of the
+    same instants.  Near the zenith a turn that holds both ways round is preferred.  If none holds the path: the one
+    that holds it longest from its start, and the result says so.
+    """
+    other_az_deg = _other_way(path_az_deg, path_el_deg)
+    first = floor((limits.min_deg - float(path_az_deg.max())) / 360.0)
+    last = ceil((limits.max_deg - float(path_az_deg.min())) / 360.0)
+    turns = [_judge(360.0 * k, path_az_deg, other_az_deg, limits) for k in range(first, last + 1)]
+
+    def merit(turn: Turn) -> tuple[float, ...]:
+        away_deg = abs(float(path_az_deg[0]) + turn.offset_deg - present_az_deg)
+        return (turn.holds_either_way, turn.holds_path, turn.held_fraction, -away_deg)
+
+    return max(turns, key=merit)
+
+
+def _other_way(az_deg: Array, el_deg: Array) -> Array:
+    """The low parts of the same pass, had it passed the zenith on the other side; the path itself if it cannot."""
+    top = int(np.argmax(el_deg))
+    if el_deg[top] < EITHER_WAY_ELEVATION_DEG or top in (0, el_deg.size - 1):
+        return az_deg
+    is_low = el_deg <= _COMMON_ELEVATION_DEG
+    is_low[[0, -1]] = True
+    is_after = np.arange(az_deg.size) > top
+    full_turn = 360.0 if az_deg[-1] > az_deg[0] else -360.0
+    return np.where(is_after, az_deg - full_turn, az_deg)[is_low]
+
+
+def _judge(offset_deg: float, az_deg: Array, other_az_deg: Array, limits: AxisLimits) -> Turn:
+    inside = (az_deg + offset_deg >= limits.min_deg) & (az_deg + offset_deg <= limits.max_deg)
+    other = other_az_deg + offset_deg
+    holds_path = bool(inside.all())
+    holds_other = bool((other >= limits.min_deg).all() and (other <= limits.max_deg).all())
+    held = 1.0 if holds_path else float(np.argmin(inside)) / az_deg.size
+    if holds_path and holds_other:
+        reason = "holds the whole pass"
+    elif holds_path:
+        reason = "holds the pass as predicted, not if it passes the zenith on the other side"
+    else:
+        reason = f"no turn holds the whole pass: this one holds the first {held:.0%} of it"
+    return Turn(offset_deg, holds_path, holds_path and holds_other, held, reason)
+
+
+def nearest_turn(az_deg: float, near_deg: float, limits: AxisLimits) -> float | None:
+    """Give the continuous angle of a bearing within the soft limits, nearest to near_deg; None if no turn reaches it."""
+    nearest = near_deg + wrap_180(az_deg - near_deg)
+    first, last = ceil((limits.min_deg - nearest) / 360.0), floor((limits.max_deg - nearest) / 360.0)
+    if first > last:
+        return None
+    return nearest + 360.0 * min(max(0, first), last)
+
+
+def sector_for(az_deg: float, limits: AxisLimits) -> int:
+    """Give the ACU's parameter S for a wanted continuous angle: 1 low half of the wrap, 2 high (ICD sections 4, 5)."""
+    return 2 if az_deg >= _middle_deg(limits) else 1
+
+
+def encoder_continuous(az_deg: float, is_sector_high: bool, limits: AxisLimits) -> float:
+    """Turn an encoder azimuth in [0, 360) and the sector bit n6.b3 into the continuous angle (ICD sections 3, 5).
+
+    Where rounding puts the bearing just outside its half, the angle nearest to that half is meant.
+    """
+    middle = _middle_deg(limits)
+    low, high = (middle, limits.max_deg) if is_sector_high else (limits.min_deg, middle)
+    centre = (low + high) / 2
+    return centre + wrap_180(az_deg - centre)
+
+
+def _middle_deg(limits: AxisLimits) -> float:
+    return (limits.min_deg + limits.max_deg) / 2
