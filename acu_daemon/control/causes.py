@@ -1,0 +1,121 @@
+"""Which causes of a transition are present now (control.states has the table they drive)."""
+
+from math import hypot
+
+from acu_daemon.control.state import ControlConfig, ControlState, PassPlan, Sky, Stage
+from acu_daemon.control.states import HOLDING, Cause, TrackState
+from acu_daemon.model import Pointing, sky_angle_deg
+from acu_daemon.protocol.messages import AcuMode, Status
+
+LINK_SILENCE_S = 0.5  # ICD section 1
+ACQUIRE_LEAD_S = 20.0  # autotrack may be selected this long before the rise
+ON_POINT_BEAMS = 0.25
+MODE_SETTLE_S = 3.0  # a MODE SELECT takes a moment to show; only later is a left mode the ACU's own doing
+
+
+def pass_end_tai_s(plan: PassPlan, sky: Sky) -> float:
+    """The end of the pass: its set by the elements, shifted by what the fit found, early or late."""
+    return plan.set_tai_s + (sky.fit.along_s if sky.fit else 0.0) + 1.0
+
+
+def find_causes(state: ControlState, sky: Sky, silence_s: float, now_tai_s: float, config: ControlConfig) -> set[Cause]:
+    """All causes that are present; the table decides which of them matters."""
+    status = state.status
+    if silence_s > LINK_SILENCE_S or status is None:
+        return {Cause.LINK_SILENT}
+    causes = {Cause.LINK_BACK} | _of_status(status)
+    if state.stage is Stage.READY and config.is_armed:
+        causes |= _of_signal(state, status, sky)
+        causes |= _of_plan(state, status, sky, now_tai_s, config)
+        causes |= _of_time(state, sky, now_tai_s, config)
+    return causes
+
+
+def _of_status(status: Status) -> set[Cause]:
+    is_local = not status.is_remote_enabled or status.mode is AcuMode.MANUAL
+    is_stowed = status.mode in (AcuMode.STOWING, AcuMode.STOWED)
+    causes = {Cause.LOCAL_PANEL if is_local else Cause.REMOTE_AGAIN}
+    causes.add(Cause.ACU_FAULT if status.mode is AcuMode.FAULT else Cause.FAULT_GONE)
+    if status.mode is AcuMode.STOWING:
+        causes.add(Cause.STOWING)
+    if not is_stowed:
+        causes.add(Cause.STOW_LEFT)
+    return causes
+
+
+def is_acquired(status: Status) -> bool:
+    """Design section 1: AUTOTRACK with ACQ set."""
+    return status.mode is AcuMode.AUTOTRACK and status.is_acquired
+
+
+def _of_signal(state: ControlState, status: Status, sky: Sky) -> set[Cause]:
+    has_fit = sky.prediction is not None and sky.prediction.kind == "FITTED"
+    causes = {Cause.FIT} if has_fit else set()
+    if is_acquired(status):
+        if sky.plan is not None:
+            causes.add(Cause.ACQUIRED_FITTED if has_fit else Cause.ACQUIRED)
+        if has_fit and state.track is TrackState.HOLD_FITTED:
+            causes.add(Cause.ACQUIRED)
+    else:
+        causes.add(Cause.LOST)
+    return causes
+
+
+def _of_plan(state: ControlState, status: Status, sky: Sky, now_tai_s: float, config: ControlConfig) -> set[Cause]:
+    plan = sky.plan
+    if plan is None:
+        return set()
+    if now_tai_s > pass_end_tai_s(plan, sky):
+        return {Cause.PASS_OVER}
+    causes: set[Cause] = set()
+    if sky.prediction is not None and now_tai_s >= plan.rise_tai_s - config.preposition_s:
+        causes.add(Cause.PASS_NEAR)
+    target = path_point(sky, now_tai_s)
+    if (
+        target is not None
+        and status.mode is AcuMode.REMOTE
+        and now_tai_s >= plan.rise_tai_s - ACQUIRE_LEAD_S
+        and _distance_deg(state, target) < ON_POINT_BEAMS * config.beamwidth_deg
+    ):
+        causes.add(Cause.ON_POINT)
+    return causes
+
+
+def path_point(sky: Sky, tai_s: float, *, follow: bool = True) -> Pointing | None:
+    """The path at an instant; before the rise it stands still at the rise point."""
+    if sky.prediction is not None and (sky.plan is None or tai_s >= sky.plan.start_tai_s):
+        return sky.prediction.at(tai_s, follow=follow)
+    if sky.plan is not None:
+        return Pointing(sky.plan.start_az_deg, sky.plan.start_el_deg, 0.0, 0.0)
+    return None
+
+
+def _distance_deg(state: ControlState, target: Pointing) -> float:
+    if state.status is None:
+        return 180.0
+    if abs(state.az_deg - target.az_deg) > 90.0:  # the same bearing on another turn of the wrap is not there yet
+        return 180.0
+    lag_deg = 0.15 * hypot(target.az_rate_deg_s, target.el_rate_deg_s)
+    return sky_angle_deg(state.az_deg, state.status.el_deg, target.az_deg, target.el_deg) - lag_deg
+
+
+def _of_time(state: ControlState, sky: Sky, now_tai_s: float, config: ControlConfig) -> set[Cause]:
+    in_state_s = now_tai_s - state.entered_tai_s
+    causes: set[Cause] = set()
+    status = state.status
+    if (
+        status is not None
+        and in_state_s > MODE_SETTLE_S
+        and not status.is_autotrack_selected
+        and status.mode in (AcuMode.STANDBY, AcuMode.REMOTE)
+    ):
+        causes.add(Cause.MODE_LEFT)
+    if state.track is TrackState.ACQUIRE_TLE and sky.plan is not None:
+        waiting_s = now_tai_s - max(state.entered_tai_s, sky.plan.rise_tai_s)
+        if waiting_s > config.acquire_s:
+            causes.add(Cause.ACQUIRE_OVER)
+    if state.track in HOLDING and now_tai_s - state.hold_from_tai_s > config.hold_s:
+        causes.add(Cause.HOLD_OVER)
+    if state.track is TrackState.SEARCH and in_state_s > config.search_s:
+        causes.add(Cause.SEARCH_OVER)
+    return causes

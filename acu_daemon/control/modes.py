@@ -1,0 +1,29 @@
+"""Which mode or backup has to be selected for the state we are in: read from the status, so it repeats until it shows."""
+
+from acu_daemon.control.state import ControlState
+from acu_daemon.control.states import AUTOTRACKING, HOLDING, TrackState
+from acu_daemon.protocol.messages import AcuMode, Backup, Command, ReadFaults, SelectBackup, SelectMode
+
+STOW_LEAVES = SelectMode(AcuMode.STANDBY)  # the one mode command that the ACU takes in STOWED, ICD section 5
+UNDER_AUTOTRACK = AUTOTRACKING | HOLDING | {TrackState.ACQUIRE_TLE, TrackState.SEARCH}
+
+
+def wanted_mode_command(state: ControlState) -> Command | None:
+    """The next command on the way to what the state needs; None when the ACU is there.
+
+    The backup comes before the mode, and the registers are written before either (ICD section 5).
+    """
+    status = state.status
+    if status is None:
+        return None
+    if state.track is TrackState.FAULT and state.last_extra != ReadFaults():
+        return ReadFaults()
+    if state.track is not TrackState.PREPOSITION and state.track not in UNDER_AUTOTRACK:
+        return None
+    if status.mode is AcuMode.STOWED:
+        return STOW_LEAVES
+    if status.backup_selected is not Backup.REMOTE:
+        return SelectBackup(Backup.REMOTE)
+    if state.track is TrackState.PREPOSITION:
+        return SelectMode(AcuMode.REMOTE) if status.mode is not AcuMode.REMOTE else None
+    return SelectMode(AcuMode.AUTOTRACK) if not status.is_autotrack_selected else None

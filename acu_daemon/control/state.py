@@ -1,0 +1,154 @@
+"""What the 10 Hz decision remembers from tick to tick, what it is given, and what it orders.  All frozen."""
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
+
+from acu_daemon.control.lag import LagEstimate
+from acu_daemon.control.states import TrackState
+from acu_daemon.model import AxisLimits, FitResult, Prediction, Reading
+from acu_daemon.pointing.axis import AxisState
+from acu_daemon.protocol.messages import Command, Nak, Reply, Status
+
+
+@dataclass(frozen=True, slots=True)
+class ControlConfig:
+    """Everything of the TOML files that the decision of a tick depends on."""
+
+    azimuth: AxisLimits
+    elevation: AxisLimits
+    period_s: float = 0.1
+    sample_delay_s: float = 0.010  # start of a write to the sample of the angles, ICD section 6
+    effect_delay_s: float = 0.020  # start of a write to the moment the command takes effect, ICD section 6
+    servo_lag_s: float = 0.0125  # prior of the learned lag: half of the ICD's greatest following error
+    beamwidth_deg: float = 1.0
+    lock_dwell_s: float = 1.0
+    min_elevation_deg: float = 5.0
+    preposition_s: float = 120.0
+    acquire_s: float = 60.0
+    hold_s: float = 1200.0
+    search_s: float = 120.0
+    search_along_s: float = 10.0
+    search_across_deg: float = 2.0
+    is_armed: bool = True
+
+
+class Stage(IntEnum):
+    """How far the start has come: poll, identity, registers read, the present angles written and read back."""
+
+    NEW = 0
+    IDENTIFIED = 1
+    REGISTERS_KNOWN = 2
+    SECTOR_FREE = 3
+    PRESENT_WRITTEN = 4
+    READY = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """A register write: the angles sent (continuous azimuth), and whether the lag may be learned from it."""
+
+    az_deg: float
+    el_deg: float
+    is_free: bool  # followed by the antenna, and not held back by the drive's limits
+
+
+@dataclass(frozen=True, slots=True)
+class ControlState:
+    """The memory of the 10 Hz decision."""
+
+    track: TrackState = TrackState.IDLE
+    entered_tai_s: float = 0.0
+    stage: Stage = Stage.NEW
+    tilt_code: int = 0
+    present_deg: tuple[float, float] | None = None  # the first register write of this start, to be read back
+    status: Status | None = None
+    reading: Reading | None = None
+    az_deg: float = 0.0  # encoder azimuth of the newest status, in the frame of the wrap (continuous)
+    az_rate_deg_s: float = 0.0  # of the encoders, between the two newest readings
+    el_rate_deg_s: float = 0.0
+    acquired_since_tai_s: float | None = None
+    has_acquired: bool = False
+    hold_from_tai_s: float = 0.0
+    offset_az_deg: float | None = None  # reading minus prediction, smoothed: carries the path before the first fit
+    offset_el_deg: float = 0.0
+    axis_az: AxisState | None = None  # the last command as position and rate, continuous azimuth
+    axis_el: AxisState | None = None
+    was_followed: bool = False
+    last_write_tai_s: float | None = None
+    commands: tuple[Sent | None, ...] = ()  # the newest three, oldest first; None: a tick without a write
+    lag_az: LagEstimate = LagEstimate()
+    lag_el: LagEstimate = LagEstimate()
+    last_extra: Command | None = None
+    extra_after_tai_s: float = 0.0
+    refused_until_tai_s: float = 0.0
+    gate_refusal_count: int = 0
+    refusal: str = ""  # of the gate, so that only its change is logged
+
+    def lag_s(self, config: ControlConfig) -> tuple[float, float]:
+        """Learned lag of azimuth and elevation, seconds."""
+        phase_s = config.period_s - config.effect_delay_s + config.sample_delay_s
+        prior_s = config.servo_lag_s
+        return (
+            self.lag_az.lag_s(phase_s, config.period_s, prior_s),
+            self.lag_el.lag_s(phase_s, config.period_s, prior_s),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Exchange:
+    """An extra exchange that was tried, and its reply; None when none came in time."""
+
+    command: Command
+    reply: Reply | None
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """What the last tick brought."""
+
+    reading: Reading | None = None  # with the status it came from; None: no good reply to the last write or poll
+    status: Status | None = None
+    extra: Exchange | None = None
+    refused: Nak | None = None  # the ACU refused the register write
+    silence_s: float = 0.0
+    has_link: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class PassPlan:
+    """The pass ahead, with the turn of the cable wrap chosen for the whole of it."""
+
+    rise_tai_s: float
+    set_tai_s: float
+    start_tai_s: float
+    start_az_deg: float  # continuous, encoder frame: where PREPOSITION goes
+    start_el_deg: float
+    note: str = ""  # why the turn is not a good one, when no turn holds the whole pass
+
+
+@dataclass(frozen=True, slots=True)
+class Sky:
+    """What the background knows: the buffer, the last fit, the plan."""
+
+    prediction: Prediction | None = None
+    fit: FitResult | None = None
+    plan: PassPlan | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A fact for the log."""
+
+    name: str
+    fields: dict[str, Any] = field(default_factory=dict)
+    is_warning: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Orders:
+    """What this tick sends: one exchange that brings a status, and at most one beside it or in the next one's place."""
+
+    first: Command
+    extra: Command | None = None
+    events: tuple[Event, ...] = ()

@@ -1,0 +1,273 @@
+"""The 10 Hz decision: what the ACU said goes in, what it is told comes out.  Pure.
+
+`tick` absorbs the newest status, walks the table of states, finds the direction the registers shall hold at the moment
+they take effect, and passes it through the safety gate.  Read control.state for its memory, control.states for the table.
+"""
+
+from dataclasses import replace
+
+from acu_daemon.control.causes import find_causes, is_acquired, path_point
+from acu_daemon.control.gate import Passed, gate
+from acu_daemon.control.modes import wanted_mode_command
+from acu_daemon.control.search import search_offset, search_pointing
+from acu_daemon.control.start import after_reply, next_command
+from acu_daemon.control.state import (
+    ControlConfig,
+    ControlState,
+    Event,
+    Observation,
+    Orders,
+    Sent,
+    Sky,
+    Stage,
+)
+from acu_daemon.control.states import ACTIVE, HOLDING, TrackState, transition
+from acu_daemon.model import Pointing, Reading
+from acu_daemon.pointing.wrap import encoder_continuous
+from acu_daemon.protocol.messages import Command, Poll, Status, WriteAndPoll
+from acu_daemon.units import wrap_180
+
+OFFSET_GAIN = 0.3  # of the newest reading in the smoothed distance between reading and prediction
+EXTRA_REPEAT_S = 0.3  # a command gets this long to show in the status before it is sent again
+REFUSED_PAUSE_S = 1.0  # after a NAK: no blind repetition
+
+
+def tick(
+    state: ControlState, seen: Observation, sky: Sky, now_tai_s: float, config: ControlConfig
+) -> tuple[ControlState, Orders]:
+    """Decide one tick.  now_tai_s: the moment the write starts, so that lateness is no pointing error."""
+    events: list[Event] = []
+    state = _absorb(state, seen, sky, now_tai_s, config, events)
+    state = _walk(state, seen, sky, now_tai_s, config, events)
+    extra = _extra(state, now_tai_s, config)
+    if not _may_write(state, now_tai_s, config):
+        state = replace(state, commands=(*state.commands[-2:], None), was_followed=False)
+        return _remember(state, extra, now_tai_s), Orders(Poll(), extra, tuple(events))
+    state, write = _write(state, sky, now_tai_s, config, events)
+    return _remember(state, extra, now_tai_s), Orders(write, extra, tuple(events))
+
+
+def _may_write(state: ControlState, now_tai_s: float, config: ControlConfig) -> bool:
+    return (
+        config.is_armed
+        and state.stage is Stage.READY
+        and state.status is not None
+        and state.status.is_remote_enabled
+        and now_tai_s >= state.refused_until_tai_s
+    )
+
+
+# What the ACU said
+
+
+def _absorb(
+    state: ControlState, seen: Observation, sky: Sky, now_tai_s: float, config: ControlConfig, events: list[Event]
+) -> ControlState:
+    if seen.extra is not None:
+        state = after_reply(state, seen.extra)
+    if seen.refused is not None:
+        state = replace(state, refused_until_tai_s=now_tai_s + REFUSED_PAUSE_S)
+        events.append(Event("acu.refused_write", {"command": str(state.commands[-1:])}, is_warning=True))
+    if seen.status is not None and seen.reading is not None:
+        state = _absorb_reading(state, seen.status, seen.reading, config)
+        state = _absorb_offset(state, sky, seen.reading)
+    return state
+
+
+def _absorb_reading(state: ControlState, status: Status, reading: Reading, config: ControlConfig) -> ControlState:
+    az_deg = encoder_continuous(status.az_deg, status.is_sector_high, config.azimuth)
+    az_rate, el_rate = 0.0, 0.0
+    if state.status is not None and state.reading is not None:
+        dt_s = reading.tai_s - state.reading.tai_s
+        if 0.02 < dt_s < 1.0:
+            az_rate = (az_deg - state.az_deg) / dt_s
+            el_rate = (status.el_deg - state.status.el_deg) / dt_s
+    since = (state.acquired_since_tai_s or reading.tai_s) if is_acquired(status) else None
+    state = _learn_lag(state, az_deg, status.el_deg)
+    return replace(
+        state,
+        status=status,
+        reading=reading,
+        az_deg=az_deg,
+        az_rate_deg_s=az_rate,
+        el_rate_deg_s=el_rate,
+        acquired_since_tai_s=since,
+        has_acquired=state.has_acquired or since is not None,
+    )
+
+
+def _learn_lag(state: ControlState, az_deg: float, el_deg: float) -> ControlState:
+    """The newest of three commands is not in force yet when the angles are sampled: learn from the one before it."""
+    if len(state.commands) < 3:
+        return state
+    before, in_force, newest = state.commands[-3:]
+    if before is None or in_force is None or newest is None:
+        return state
+    if not (before.is_free and in_force.is_free and newest.is_free):
+        return state
+    return replace(
+        state,
+        lag_az=state.lag_az.seen(in_force.az_deg - before.az_deg, in_force.az_deg - az_deg),
+        lag_el=state.lag_el.seen(in_force.el_deg - before.el_deg, in_force.el_deg - el_deg),
+    )
+
+
+def _absorb_offset(state: ControlState, sky: Sky, reading: Reading) -> ControlState:
+    """Follow the distance between reading and prediction while acquired: it carries the path before the first fit."""
+    point = sky.prediction.at(reading.tai_s) if sky.prediction else None
+    if point is None or state.status is None or not is_acquired(state.status):
+        return state
+    az = wrap_180(reading.az_deg - point.az_deg)
+    el = reading.el_deg - point.el_deg
+    if state.offset_az_deg is None:
+        return replace(state, offset_az_deg=az, offset_el_deg=el)
+    return replace(
+        state,
+        offset_az_deg=state.offset_az_deg + OFFSET_GAIN * wrap_180(az - state.offset_az_deg),
+        offset_el_deg=state.offset_el_deg + OFFSET_GAIN * (el - state.offset_el_deg),
+    )
+
+
+# The table
+
+
+def _walk(
+    state: ControlState, seen: Observation, sky: Sky, now_tai_s: float, config: ControlConfig, events: list[Event]
+) -> ControlState:
+    causes = find_causes(state, sky, seen.silence_s, now_tai_s, config)
+    if state.track in HOLDING and _is_sure(sky, now_tai_s, config):
+        state = replace(state, hold_from_tai_s=now_tai_s)
+    step = transition(state.track, causes)
+    if step is None:
+        return state
+    track, cause = step
+    events.append(
+        Event(
+            "state.changed",
+            {"state": str(track), "before": str(state.track), "cause": str(cause)},
+            is_warning=track in (TrackState.LINK_LOST, TrackState.FAULT, TrackState.SEARCH),
+        )
+    )
+    state = replace(state, track=track, entered_tai_s=now_tai_s)
+    if track is TrackState.LINK_LOST:
+        state = replace(state, stage=Stage.NEW, last_extra=None, axis_az=None, axis_el=None, commands=())
+    if track in HOLDING:
+        state = replace(state, hold_from_tai_s=now_tai_s)
+    return state
+
+
+def _is_sure(sky: Sky, now_tai_s: float, config: ControlConfig) -> bool:
+    """Whether 3 sigma of the prediction still lie within half the beam (only for estimators that know a sigma)."""
+    prediction = sky.prediction
+    if prediction is None or prediction.sigma_deg is None:
+        return False
+    i = round((now_tai_s - prediction.start_tai_s) / prediction.step_s)
+    return 0 <= i < prediction.sigma_deg.size and 3.0 * float(prediction.sigma_deg[i]) <= config.beamwidth_deg / 2
+
+
+# What it is told
+
+
+def _extra(state: ControlState, now_tai_s: float, config: ControlConfig) -> Command | None:
+    if state.status is None or not state.status.is_remote_enabled:
+        return None
+    wanted = next_command(state, config)
+    if wanted is None and state.stage is Stage.READY:
+        wanted = wanted_mode_command(state)
+    if wanted is None or (wanted == state.last_extra and now_tai_s < state.extra_after_tai_s):
+        return None
+    return wanted
+
+
+def _remember(state: ControlState, extra: Command | None, now_tai_s: float) -> ControlState:
+    if extra is None:
+        return state
+    return replace(state, last_extra=extra, extra_after_tai_s=now_tai_s + EXTRA_REPEAT_S)
+
+
+def _write(
+    state: ControlState, sky: Sky, now_tai_s: float, config: ControlConfig, events: list[Event]
+) -> tuple[ControlState, WriteAndPoll]:
+    is_followed = state.status is not None and state.status.follows_registers
+    wanted = _wanted(state, sky, now_tai_s, config, is_followed=is_followed)
+    dt_s = now_tai_s - state.last_write_tai_s if state.last_write_tai_s is not None else config.period_s
+    dt_s = min(max(dt_s, config.period_s / 2), 3 * config.period_s)
+    passed = gate(wanted, state, is_followed=is_followed, dt_s=dt_s, config=config)
+    if passed.refusal != state.refusal:
+        if passed.refusal:
+            events.append(Event("gate.refused", {"reason": passed.refusal, "state": str(state.track)}, is_warning=True))
+        state = replace(state, refusal=passed.refusal)
+    return _sent(state, passed, now_tai_s, is_followed=is_followed)
+
+
+def _sent(
+    state: ControlState, passed: Passed, now_tai_s: float, *, is_followed: bool
+) -> tuple[ControlState, WriteAndPoll]:
+    az_deg, el_deg = passed.az.position_deg, passed.el.position_deg
+    sent = Sent(az_deg, el_deg, is_free=is_followed and state.was_followed and not passed.is_held_back)
+    state = replace(
+        state,
+        axis_az=passed.az,
+        axis_el=passed.el,
+        was_followed=is_followed,
+        last_write_tai_s=now_tai_s,
+        commands=(*state.commands[-2:], sent),
+        gate_refusal_count=state.gate_refusal_count + bool(passed.refusal),
+    )
+    return state, WriteAndPoll(az_deg, el_deg, state.tilt_code)
+
+
+def _wanted(state: ControlState, sky: Sky, now_tai_s: float, config: ControlConfig, *, is_followed: bool) -> Pointing:
+    """The direction the registers shall hold: for the middle of the time they are in force, led by the learned lag."""
+    lag_az_s, lag_el_s = state.lag_s(config) if is_followed else (0.0, 0.0)
+    aim_tai_s = now_tai_s + config.effect_delay_s + config.period_s / 2
+    az = _point(state, sky, aim_tai_s + lag_az_s, config, is_followed=is_followed)
+    el = _point(state, sky, aim_tai_s + lag_el_s, config, is_followed=is_followed)
+    if az is None or el is None:
+        return _rest(state, is_followed=is_followed)
+    az_deg = (
+        _on_turn(az.az_deg, state, config) if is_followed and state.track is not TrackState.PREPOSITION else az.az_deg
+    )
+    return _within(Pointing(az_deg, el.el_deg, az.az_rate_deg_s, el.el_rate_deg_s), config, is_followed=is_followed)
+
+
+def _point(
+    state: ControlState, sky: Sky, aim_tai_s: float, config: ControlConfig, *, is_followed: bool
+) -> Pointing | None:
+    if state.track not in ACTIVE:
+        return None
+    if state.track is TrackState.SEARCH and sky.prediction is not None:
+        offset = search_offset(
+            aim_tai_s - state.entered_tai_s, config.search_s, config.search_along_s, config.search_across_deg
+        )
+        return search_pointing(sky.prediction, aim_tai_s, offset, config.elevation, config.min_elevation_deg)
+    point = path_point(sky, aim_tai_s, follow=is_followed)
+    if state.track in (TrackState.AUTOTRACK_TLE, TrackState.HOLD_TLE) and state.offset_az_deg is not None and point:
+        return replace(point, az_deg=point.az_deg + state.offset_az_deg, el_deg=point.el_deg + state.offset_el_deg)
+    return point
+
+
+def _rest(state: ControlState, *, is_followed: bool) -> Pointing:
+    """Where nothing is to be followed: the present angles, or a standstill for an antenna that follows."""
+    if is_followed and state.axis_az is not None and state.axis_el is not None:
+        return Pointing(state.axis_az.position_deg, state.axis_el.position_deg, 0.0, 0.0)
+    el_deg = state.status.el_deg if state.status is not None else 0.0
+    return Pointing(state.az_deg, el_deg, 0.0, 0.0)
+
+
+def _on_turn(az_deg: float, state: ControlState, config: ControlConfig) -> float:
+    """Take the same bearing on the antenna's own turn of the wrap, where the limits allow it."""
+    near_deg = state.axis_az.position_deg if state.axis_az is not None and state.was_followed else state.az_deg
+    nearest_deg = near_deg + wrap_180(az_deg - near_deg)
+    if config.azimuth.min_deg <= nearest_deg <= config.azimuth.max_deg:
+        return nearest_deg
+    return az_deg
+
+
+def _within(point: Pointing, config: ControlConfig, *, is_followed: bool) -> Pointing:
+    """Registers that are not followed may hold any turn: take one inside the limits."""
+    az_deg = point.az_deg
+    if not is_followed and not config.azimuth.min_deg <= az_deg <= config.azimuth.max_deg:
+        middle_deg = (config.azimuth.min_deg + config.azimuth.max_deg) / 2
+        az_deg = middle_deg + wrap_180(az_deg - middle_deg)
+    return replace(point, az_deg=az_deg)
