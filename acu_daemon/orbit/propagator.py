@@ -1,0 +1,31 @@
+"""What every source of orbits can do."""
+
+from typing import Protocol
+
+from acu_daemon.model import Correction
+from acu_daemon.units import Array
+
+
+class Propagator(Protocol):
+    """A satellite's motion.  Immutable and picklable (it is sent to the process that fits)."""
+
+    @property
+    def kind(self) -> str:
+        """The source: "brouwer", "tle", "omm" and so on."""
+
+    @property
+    def epoch_tai_s(self) -> float:
+        """Epoch of the elements."""
+
+    def states_teme(self, tai_s: Array) -> tuple[Array, Array]:
+        """Positions (N, 3) in metres and velocities (N, 3) in m/s at the times (N,).
+
+        Frame:   true equator, mean equinox of date (TEME).
+        Raises:  OrbitError: no answer for one of the times (decayed); the message names satellite, time and reason.
+        """
+
+    def corrected(self, correction: Correction) -> "Propagator":
+        """The same source with a correction of its mean elements at epoch.
+
+        The correction is absolute: it replaces one given before, and `Correction()` gives the source itself.
+        """
