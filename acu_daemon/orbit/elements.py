@@ -1,0 +1,136 @@
+"""Which element set of a list is used, and whether it is fit for use: sanity limits, age, decay."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from acu_daemon.errors import ElementsError, OrbitError
+from acu_daemon.orbit.brouwer import BrouwerElements
+from acu_daemon.orbit.element_set import ElementSet, Problem
+from acu_daemon.orbit.sgp4_source import Sgp4Propagator
+from acu_daemon.orbit.timescales import utc_text
+from acu_daemon.units import DAY_S, DEG, EARTH_EQUATORIAL_RADIUS_M
+
+__all__ = ["ElementLimits", "ElementSet", "Problem", "check_brouwer", "check_elements", "select_elements"]
+
+_DECAYED_PERIGEE_KM = 120.0  # below this an orbit does not last a revolution
+_NAMED_IN_MESSAGES = 5
+
+
+@dataclass(frozen=True, slots=True)
+class ElementLimits:
+    """What elements must keep to; the defaults suit low orbits.  `[elements.limits]` of a satellite's TOML."""
+
+    min_semi_major_axis_km: float = 6500.0
+    max_semi_major_axis_km: float = 8500.0
+    min_eccentricity: float = 0.0
+    max_eccentricity: float = 0.1
+    min_inclination_deg: float = 0.0
+    max_inclination_deg: float = 180.0
+    warn_age_days: float = 10.0
+    max_age_days: float = 30.0
+
+
+def check_elements(elements: ElementSet, limits: ElementLimits, now_tai_s: float) -> tuple[list[str], list[str]]:
+    """Check one element set against the limits, its age, and decay.
+
+    Returns: errors (it must not be used) and warnings, each with file, line and reason.
+    """
+    label = f"{elements.where}: {elements.label}"
+    a_m, e = elements.semi_major_axis_m, elements.eccentricity
+    errors, warnings = _check(label, a_m, e, elements.inclination_rad, elements.epoch_tai_s, limits, now_tai_s)
+    if not errors:
+        try:
+            Sgp4Propagator(elements).states_teme(np.array([now_tai_s]))
+        except OrbitError as error:
+            errors.append(f"{elements.where}: {error}")
+    return errors, warnings
+
+
+def check_brouwer(
+    elements: BrouwerElements, limits: ElementLimits, now_tai_s: float, file: str
+) -> tuple[list[str], list[str]]:
+    """Check elements written in a TOML file against the limits and their age; errors and warnings as texts."""
+    label = f"{file}: {elements.name}"
+    return _check(label, elements.a_m, elements.e, elements.i_rad, elements.epoch_tai_s, limits, now_tai_s)
+
+
+def _check(
+    label: str, a_m: float, e: float, i_rad: float, epoch_tai_s: float, limits: ElementLimits, now_tai_s: float
+) -> tuple[list[str], list[str]]:
+    ranges = (
+        ("semi-major axis", a_m / 1e3, limits.min_semi_major_axis_km, limits.max_semi_major_axis_km, " km"),
+        ("eccentricity", e, limits.min_eccentricity, limits.max_eccentricity, ""),
+        ("inclination", i_rad / DEG, limits.min_inclination_deg, limits.max_inclination_deg, " deg"),
+    )
+    errors = [
+        f"{label}: {what} {value:.7g}{unit} is outside {low:g}..{high:g}{unit}; "
+        "if it is right, widen [elements.limits] in the satellite's file"
+        for what, value, low, high, unit in ranges
+        if not low <= round(value, 9) <= high
+    ]
+    perigee_km = (a_m * (1.0 - e) - EARTH_EQUATORIAL_RADIUS_M) / 1e3
+    if not perigee_km >= _DECAYED_PERIGEE_KM:
+        errors.append(
+            f"{label}: mean perigee at {perigee_km:.0f} km height, under {_DECAYED_PERIGEE_KM:.0f} km: "
+            "the satellite has decayed, or the elements are wrong"
+        )
+    warnings: list[str] = []
+    age_days = (now_tai_s - epoch_tai_s) / DAY_S
+    if abs(age_days) > limits.warn_age_days:
+        relation = f"{age_days:.1f} days old" if age_days > 0 else f"{-age_days:.1f} days ahead of the clock"
+        text = f"{label}: the epoch {utc_text(epoch_tai_s, 0)} is {relation}"
+        if abs(age_days) > limits.max_age_days:
+            errors.append(f"{text}, the limit is {limits.max_age_days:g} days; fetch newer elements")
+        else:
+            warnings.append(f"{text}; predictions may be off, fetch newer elements")
+    return errors, warnings
+
+
+def select_elements(
+    sets: Sequence[ElementSet], norad_id: int | None, name: str | None, now_tai_s: float
+) -> tuple[ElementSet, list[str]]:
+    """Choose a satellite's element set: the newest not after now, else the oldest.
+
+    Searched by `norad_id` if given; else, in a list of several satellites, by name (case, hyphens and blanks do not
+    count).  A file with one satellite needs neither.
+
+    Returns: the set, and warnings.
+    Raises:  ElementsError: no set, none of this satellite, or a name that two satellites bear.
+    """
+    if not sets:
+        raise ElementsError("no usable element set in the file")
+    found = list(sets)
+    if norad_id is not None:
+        found = _matching(sets, lambda one: one.norad_id == norad_id, f"norad_id {norad_id}")
+    elif len({one.norad_id for one in sets}) > 1:
+        if name is None:
+            raise ElementsError(f"{sets[0].file}: {_contents(sets)}; say which by norad_id")
+        found = _matching(sets, lambda one: _plain(one.name) == _plain(name), f"name {name!r}")
+    ids = sorted({one.norad_id for one in found})
+    if len(ids) > 1:
+        raise ElementsError(f"{sets[0].file}: the name {name!r} fits the satellites {ids}; say which by norad_id")
+    past = [one for one in found if one.epoch_tai_s <= now_tai_s]
+    if past:
+        return max(past, key=lambda one: one.epoch_tai_s), []
+    oldest = min(found, key=lambda one: one.epoch_tai_s)
+    epoch = utc_text(oldest.epoch_tai_s, 0)
+    return oldest, [f"{oldest.where}: {oldest.label}: every epoch is ahead of the clock, the oldest ({epoch}) is used"]
+
+
+def _matching(sets: Sequence[ElementSet], fits: Callable[[ElementSet], bool], wanted: str) -> list[ElementSet]:
+    found = [one for one in sets if fits(one)]
+    if not found:
+        raise ElementsError(f"{sets[0].file}: no element set with {wanted}; {_contents(sets)}")
+    return found
+
+
+def _contents(sets: Sequence[ElementSet]) -> str:
+    labels = list(dict.fromkeys(one.label for one in sets))
+    more = f" and {len(labels) - _NAMED_IN_MESSAGES} more" if len(labels) > _NAMED_IN_MESSAGES else ""
+    return f"the file holds {', '.join(labels[:_NAMED_IN_MESSAGES])}{more}"
+
+
+def _plain(name: str) -> str:
+    return "".join(c for c in name.casefold() if c not in " -_")
