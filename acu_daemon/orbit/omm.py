@@ -124,7 +124,7 @@ def _read_json(text: str) -> Iterator[_Record | _BadRecordError]:
         return
     for record, item in enumerate(content if isinstance(content, list) else [content], start=1):
         if isinstance(item, dict):
-            values = {key: "" if value is None else str(value) for key, value in item.items()}
+            values = {key: str(value) for key, value in item.items() if isinstance(value, str | int | float)}
             yield _Record(values, record=record)
         else:
             yield _BadRecordError("not an object with the fields of an OMM", record=record)
