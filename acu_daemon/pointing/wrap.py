@@ -79,7 +79,7 @@ def _judge(offset_deg: float, az_deg: Array, other_az_deg: Array, limits: AxisLi
 
 
 def nearest_turn(az_deg: float, near_deg: float, limits: AxisLimits) -> float | None:
-    """Give the continuous angle of a bearing within the soft limits, nearest to near_deg; None if no turn reaches it."""
+    """Give a bearing as the continuous angle within the soft limits nearest to near_deg; None if no turn reaches it."""
     nearest = near_deg + wrap_180(az_deg - near_deg)
     first, last = ceil((limits.min_deg - nearest) / 360.0), floor((limits.max_deg - nearest) / 360.0)
     if first > last:

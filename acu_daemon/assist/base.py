@@ -1,0 +1,118 @@
+"""What all estimators share: the gate, the count of readings, and the figures of a fit.  Pure."""
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from acu_daemon.assist.gate import ReadingGate, Rejected
+from acu_daemon.assist.settings import EstimatorSettings
+from acu_daemon.model import Correction, FitResult, Readings, Site, sky_angle_deg
+from acu_daemon.orbit.frames import station_itrs_m, teme_from_itrs
+from acu_daemon.orbit.look import look_at
+from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.units import DEG, MU_M3_S2, Array
+
+_NEWEST_COUNT = 30  # readings that the residual is taken over
+
+
+class BaseEstimator(ABC):
+    """Takes readings, oldest first, and corrects raan and mean anomaly of a source.  Mutable; one owner.
+
+    `rejected` has every reading left out, with its reason.
+    """
+
+    name: str
+
+    def __init__(self, propagator: Propagator, site: Site, settings: EstimatorSettings) -> None:
+        self._source = propagator
+        self._site = site
+        self._settings = settings
+        self._gate = ReadingGate(
+            settings.max_fit_elevation_deg,
+            settings.sigma_azimuth_deg,
+            settings.sigma_elevation_deg,
+            settings.azimuth,
+            settings.elevation,
+        )
+        self.rejected: list[Rejected] = []
+        self.used_count = 0
+        self._newest: list[tuple[float, float, float]] = []
+
+    @abstractmethod
+    def _use(self, readings: Readings) -> list[str | None]:
+        """Take in readings; give a reason for each that was left out."""
+
+    @abstractmethod
+    def _correction(self) -> Correction | None:
+        """Give the present correction, None before the first one."""
+
+    def add(self, readings: Readings) -> None:
+        """Take new readings only, oldest first, encoder angles.
+
+        Raises:  OrbitError: the source has no answer for one of their times.
+        """
+        kept, rejected = self._gate.split(readings)
+        self.rejected += rejected
+        if len(kept) == 0:
+            return
+        reasons = self._use(kept)
+        rows = zip(kept.tai_s.tolist(), kept.az_deg.tolist(), kept.el_deg.tolist(), strict=True)
+        used = []
+        for row, reason in zip(rows, reasons, strict=True):
+            if reason is None:
+                used.append(row)
+            else:
+                self.rejected.append(Rejected(row[0], reason))
+        self.used_count += len(used)
+        self._newest = (self._newest + used)[-_NEWEST_COUNT:]
+
+    def fit(self) -> FitResult | None:
+        """Give the fit to all readings so far; None while there are too few."""
+        correction = self._correction()
+        if correction is None or not self._newest:
+            return None
+        corrected = self._source.corrected(correction)
+        tai_s, az_deg, el_deg = np.array(self._newest).T
+        seen = look_at(corrected, tai_s, self._site)
+        pairs = zip(az_deg, el_deg, seen.az_deg, seen.el_deg, strict=True)
+        residuals = np.array([sky_angle_deg(*(float(x) for x in pair)) for pair in pairs])
+        along_s, across_deg = for_people(corrected, correction, float(tai_s[-1]), self._site)
+        return FitResult(
+            estimator=self.name,
+            correction=correction,
+            at_tai_s=float(tai_s[-1]),
+            reading_count=self.used_count,
+            rejected_count=len(self.rejected),
+            residual_rms_deg=float(np.sqrt(np.mean(residuals**2))),
+            along_s=along_s,
+            across_deg=across_deg,
+        )
+
+
+def for_people(propagator: Propagator, correction: Correction, tai_s: float, site: Site) -> tuple[float, float]:
+    """Show a correction as seconds along the track and degrees across it.
+
+    along_s: minus the correction of the mean anomaly over the mean motion: a satellite ahead of its elements is
+    early (-), one behind them late (+).
+    across_deg: how far the correction of raan moves the satellite out of its orbital plane at tai_s, as an angle on
+    the sky of the station at that instant; right of the inertial motion, up being away from the Earth, is positive.
+    """
+    times = np.array([tai_s])
+    r_m, v_m_s = propagator.states_teme(times)
+    station_m = teme_from_itrs(station_itrs_m(site.station), times, site.orientation)[0]
+    r, v = r_m[0], v_m_s[0]
+    right = np.cross(v, r)
+    right /= np.linalg.norm(right)
+    shift_m = correction.delta_raan_rad * float(np.cross([0.0, 0.0, 1.0], r) @ right)
+    sight = r - station_m
+    range_m = float(np.linalg.norm(sight))
+    foreshortening = float(np.sqrt(max(0.0, 1.0 - (float(right @ sight) / range_m) ** 2)))
+    along_s = -correction.delta_mean_anomaly_rad / float(mean_motion_rad_s(r_m, v_m_s)[0])
+    return along_s, shift_m * foreshortening / range_m / DEG
+
+
+def mean_motion_rad_s(r_m: Array, v_m_s: Array) -> Array:
+    """Keplerian mean motion of inertial states (N, 3), (N,).  Seed 002, eq 4.12; a from the vis-viva law."""
+    a_m = 1.0 / (2.0 / np.linalg.norm(r_m, axis=1) - np.sum(v_m_s**2, axis=1) / MU_M3_S2)
+    n: Array = np.sqrt(MU_M3_S2 / a_m**3)
+    return n

@@ -1,0 +1,92 @@
+"""Which readings are fit to be used: the dwell after acquisition, and plain reasons to leave a reading out.  Pure."""
+
+from dataclasses import dataclass
+from math import cos, hypot, radians
+
+from acu_daemon.model import AxisLimits, Reading, Readings
+from acu_daemon.units import wrap_180
+
+ABOVE_MAX_ELEVATION = "above the highest elevation for fits"
+TOO_FAST = "faster than the axis can move"
+OUTLIER = "far from the prediction of the fit"
+
+_RATE_MARGIN = 1.1  # an encoder's time tag jitters
+_SIGMA_COUNT = 6.0
+
+
+@dataclass(frozen=True, slots=True)
+class Rejected:
+    """A reading that was not used, and why."""
+
+    tai_s: float
+    reason: str
+
+
+class Dwell:
+    """Lets readings through that have been acquired for at least the dwell time without a break: locked ones.
+
+    Mutable; one owner.  A gap between readings longer than max_gap_s breaks the acquisition: nobody saw what happened.
+    """
+
+    def __init__(self, lock_dwell_s: float, max_gap_s: float = 6.0) -> None:
+        self._dwell_s = lock_dwell_s
+        self._max_gap_s = max_gap_s
+        self._since_tai_s: float | None = None
+        self._last_tai_s: float | None = None
+
+    def is_locked(self, reading: Reading) -> bool:
+        """Take the next reading, oldest first, and say whether it counts as locked."""
+        if not reading.is_locked:
+            self._since_tai_s = self._last_tai_s = None
+            return False
+        if self._last_tai_s is None or reading.tai_s - self._last_tai_s > self._max_gap_s:
+            self._since_tai_s = reading.tai_s
+        self._last_tai_s = reading.tai_s
+        since = reading.tai_s if self._since_tai_s is None else self._since_tai_s
+        return reading.tai_s - since >= self._dwell_s - 1e-6
+
+
+class ReadingGate:
+    """Leaves out what no fit should see, before any orbit is involved.  Mutable; one owner.
+
+    A reading that jumped is compared with the last good one, so a jump is believed once the axis could have made it.
+    """
+
+    def __init__(
+        self,
+        max_elevation_deg: float,
+        sigma_azimuth_deg: float,
+        sigma_elevation_deg: float,
+        azimuth: AxisLimits | None,
+        elevation: AxisLimits | None,
+    ) -> None:
+        self._max_elevation_deg = max_elevation_deg
+        self._sigma_deg = (sigma_azimuth_deg, sigma_elevation_deg)
+        self._azimuth, self._elevation = azimuth, elevation
+        self._last: tuple[float, float, float] | None = None
+
+    def split(self, readings: Readings) -> tuple[Readings, list[Rejected]]:
+        """Part the readings into those to use and those left out, oldest first."""
+        keep: list[int] = []
+        rejected: list[Rejected] = []
+        rows = zip(readings.tai_s.tolist(), readings.az_deg.tolist(), readings.el_deg.tolist(), strict=True)
+        for k, row in enumerate(rows):
+            if self._is_too_fast(*row):
+                rejected.append(Rejected(row[0], TOO_FAST))
+                continue
+            self._last = row
+            if row[2] > self._max_elevation_deg:
+                rejected.append(Rejected(row[0], ABOVE_MAX_ELEVATION))
+            else:
+                keep.append(k)
+        return Readings(readings.tai_s[keep], readings.az_deg[keep], readings.el_deg[keep]), rejected
+
+    def _is_too_fast(self, tai_s: float, az_deg: float, el_deg: float) -> bool:
+        if self._last is None or self._azimuth is None or self._elevation is None:
+            return False
+        dt_s = tai_s - self._last[0]
+        cos_el = max(cos(radians(max(el_deg, self._last[2]))), 1e-3)
+        noise_deg = _SIGMA_COUNT * hypot(self._sigma_deg[0], self._sigma_deg[0]) / cos_el
+        far_az = self._azimuth.max_rate_deg_s * _RATE_MARGIN * dt_s + noise_deg
+        far_el = self._elevation.max_rate_deg_s * _RATE_MARGIN * dt_s + _SIGMA_COUNT * hypot(*(self._sigma_deg[1],) * 2)
+        return abs(wrap_180(az_deg - self._last[1])) > far_az or abs(el_deg - self._last[2]) > far_el

@@ -1,0 +1,69 @@
+"""The prediction buffer: where the satellite will be, at even steps ahead of now.  Pure."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from acu_daemon.model import Prediction, PredictionKind, Site
+from acu_daemon.orbit.look import look_at
+from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.units import Array, wrap_180, wrap_180_array
+
+FollowPath = Callable[[Array, Array, float], tuple[Array, Array]]
+"""From continuous azimuth, its rate (N,) and the step in s to an azimuth path and rate that the drive can follow."""
+
+
+def _as_it_is(az_deg: Array, az_rate_deg_s: Array, _step_s: float) -> tuple[Array, Array]:
+    return az_deg, az_rate_deg_s
+
+
+def predict(
+    propagator: Propagator,
+    site: Site,
+    start_tai_s: float,
+    made_at_tai_s: float,
+    kind: PredictionKind,
+    near_az_deg: float,
+    *,
+    horizon_s: float = 90.0,
+    step_s: float = 0.1,
+    lead_in_s: float = 0.0,
+    follow: FollowPath = _as_it_is,
+) -> Prediction:
+    """Predict pointing from start_tai_s over horizon_s.
+
+    near_az_deg: continuous azimuth (encoder frame) near which the path starts; it picks the turn.  From there azimuth
+    is continuous, through north and past the zenith.  follow: makes the path for an antenna that follows the registers,
+    such as `pointing.keyhole.follow_path` with the drive's limits; it sees the path from lead_in_s before the start,
+    so that a buffer that starts inside the keyhole continues what the one before it planned.
+    Raises:  OrbitError: the propagator has no answer for one of the times.
+    Source:  seed 000, section 4; 90 s at 10 Hz: seed 001, section 2.5.
+    """
+    before = round(lead_in_s / step_s)
+    tai_s = start_tai_s + step_s * np.arange(-before, round(horizon_s / step_s) + 1, dtype=np.float64)
+    seen = look_at(propagator, tai_s, site)
+    az_deg = _continuous(seen.az_deg, seen.az_rate_deg_s, step_s)
+    az_deg += near_az_deg + wrap_180(float(seen.az_deg[before]) - near_az_deg) - az_deg[before]
+    follow_az_deg, follow_az_rate_deg_s = follow(az_deg, seen.az_rate_deg_s, step_s)
+    return Prediction(
+        start_tai_s=start_tai_s,
+        step_s=step_s,
+        az_deg=az_deg[before:],
+        el_deg=seen.el_deg[before:],
+        az_rate_deg_s=seen.az_rate_deg_s[before:],
+        el_rate_deg_s=seen.el_rate_deg_s[before:],
+        follow_az_deg=follow_az_deg[before:],
+        follow_az_rate_deg_s=follow_az_rate_deg_s[before:],
+        kind=kind,
+        made_at_tai_s=made_at_tai_s,
+    )
+
+
+def _continuous(az_deg: Array, az_rate_deg_s: Array, step_s: float) -> Array:
+    """Unwrap [0, 360) azimuths; a step past the zenith turns the way the rates say, even by nearly 180 degrees."""
+    steps = wrap_180_array(np.diff(az_deg))
+    turning = az_rate_deg_s[:-1] + az_rate_deg_s[1:]
+    against = (np.abs(steps) > 90.0) & (steps * turning < 0.0)
+    steps += np.where(against, 360.0 * np.sign(turning), 0.0)
+    continuous: Array = float(az_deg[0]) + np.concatenate(([0.0], np.cumsum(steps)))
+    return continuous
