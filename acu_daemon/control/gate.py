@@ -1,7 +1,7 @@
-"""The safety gate: the last thing that happens to a register write, and no command passes beside it (design section 3).
+"""The safety gate: the last thing that happens to a register write; none passes beside it (design section 3).
 
-Not finite or outside the limits: refused with a reason, the last good value stays.  Registers that the antenna follows are
-clamped to what the axis can do; registers it does not follow hold the true path, also through the zenith.
+Not finite or outside the limits: refused with a reason, the last good value stays.  Registers that the antenna follows
+are clamped to what the axis can do; registers it does not follow hold the true path, also through the zenith.
 """
 
 from dataclasses import dataclass, replace

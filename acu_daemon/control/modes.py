@@ -1,4 +1,4 @@
-"""Which mode or backup has to be selected for the state we are in: read from the status, so it repeats until it shows."""
+"""Which mode or backup the present state needs: judged by the status, so a command repeats until it shows."""
 
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.states import AUTOTRACKING, HOLDING, TrackState

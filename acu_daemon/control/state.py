@@ -18,7 +18,8 @@ class ControlConfig:
     azimuth: AxisLimits
     elevation: AxisLimits
     period_s: float = 0.1
-    sample_delay_s: float = 0.010  # start of a write to the sample of the angles, ICD section 6
+    sample_delay_s: float = 0.010  # start of WRITE AND STATUS to the sample of the angles, ICD section 6
+    poll_sample_delay_s: float = 0.010  # the same for STATUS POLL
     effect_delay_s: float = 0.020  # start of a write to the moment the command takes effect, ICD section 6
     servo_lag_s: float = 0.0125  # prior of the learned lag: half of the ICD's greatest following error
     beamwidth_deg: float = 1.0
@@ -112,7 +113,8 @@ class Observation:
     extra: Exchange | None = None
     refused: Nak | None = None  # the ACU refused the register write
     silence_s: float = 0.0
-    has_link: bool = True
+    must_poll: bool = False  # the last exchange failed: the next command is a poll (ICD section 1)
+    has_room: bool = True  # the computed cycle leaves room for a second exchange beside the write (ICD section 6)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """The 10 Hz decision: what the ACU said goes in, what it is told comes out.  Pure.
 
 `tick` absorbs the newest status, walks the table of states, finds the direction the registers shall hold at the moment
-they take effect, and passes it through the safety gate.  Read control.state for its memory, control.states for the table.
+they take effect, and passes it through the safety gate.  control.state is its memory, control.states the table.
 """
 
 from dataclasses import replace
@@ -39,9 +39,12 @@ def tick(
     events: list[Event] = []
     state = _absorb(state, seen, sky, now_tai_s, config, events)
     state = _walk(state, seen, sky, now_tai_s, config, events)
-    extra = _extra(state, now_tai_s, config)
-    if not _may_write(state, now_tai_s, config):
-        state = replace(state, commands=(*state.commands[-2:], None), was_followed=False)
+    extra = None if seen.must_poll else _extra(state, now_tai_s, config)
+    if extra is not None and not seen.has_room:
+        state = replace(state, commands=(*state.commands[-2:], None))
+        return _remember(state, extra, now_tai_s), Orders(extra, None, tuple(events))
+    if seen.must_poll or not _may_write(state, now_tai_s, config):
+        state = replace(state, commands=(*state.commands[-2:], None))
         return _remember(state, extra, now_tai_s), Orders(Poll(), extra, tuple(events))
     state, write = _write(state, sky, now_tai_s, config, events)
     return _remember(state, extra, now_tai_s), Orders(write, extra, tuple(events))
@@ -225,9 +228,9 @@ def _wanted(state: ControlState, sky: Sky, now_tai_s: float, config: ControlConf
     el = _point(state, sky, aim_tai_s + lag_el_s, config, is_followed=is_followed)
     if az is None or el is None:
         return _rest(state, is_followed=is_followed)
-    az_deg = (
-        _on_turn(az.az_deg, state, config) if is_followed and state.track is not TrackState.PREPOSITION else az.az_deg
-    )
+    az_deg = az.az_deg
+    if is_followed and state.track is not TrackState.PREPOSITION:
+        az_deg = _on_turn(az_deg, state, config)
     return _within(Pointing(az_deg, el.el_deg, az.az_rate_deg_s, el.el_rate_deg_s), config, is_followed=is_followed)
 
 

@@ -1,0 +1,33 @@
+"""The plan of a pass, made before it starts: where to stand, and on which turn of the cable wrap."""
+
+import numpy as np
+
+from acu_daemon.control.state import PassPlan
+from acu_daemon.model import AxisLimits, Pass, Site
+from acu_daemon.orbit.look import look_at
+from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.pointing.wrap import choose_turn
+
+STEP_S = 0.25  # fine enough to unwrap the azimuth of a pass 0.1 deg from the zenith
+
+
+def plan_pass(
+    propagator: Propagator, site: Site, coming: Pass, present_az_deg: float, azimuth: AxisLimits, now_tai_s: float
+) -> PassPlan:
+    """Choose the turn that holds what is left of the pass, and the point where the antenna waits for it.
+
+    present_az_deg: where the antenna stands, continuous azimuth in the encoder frame.
+    """
+    start_tai_s = min(max(coming.rise_tai_s, now_tai_s), coming.set_tai_s - 1.0)
+    tai_s = np.arange(start_tai_s, coming.set_tai_s + STEP_S, STEP_S)
+    look = look_at(propagator, tai_s, site)
+    az_deg = np.degrees(np.unwrap(np.radians(look.az_deg)))
+    turn = choose_turn(az_deg, look.el_deg, azimuth, present_az_deg)
+    return PassPlan(
+        rise_tai_s=coming.rise_tai_s,
+        set_tai_s=coming.set_tai_s,
+        start_tai_s=start_tai_s,
+        start_az_deg=float(az_deg[0]) + turn.offset_deg,
+        start_el_deg=float(look.el_deg[0]),
+        note="" if turn.holds_path else turn.reason,
+    )

@@ -1,0 +1,60 @@
+"""The common area: the one object that foreground and background share (seed 001, 2.5), and people's view of it."""
+
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from acu_daemon.control.state import ControlState, Sky
+from acu_daemon.model import Reading, Readings
+
+
+@dataclass(slots=True)
+class CommonArea:
+    """Last reading, readings to fit, prediction, flags.  The foreground writes all but `sky`, the background that."""
+
+    state: ControlState = field(default_factory=ControlState)
+    sky: Sky = field(default_factory=Sky)
+    to_fit: deque[Reading] = field(default_factory=deque)  # locked readings the background has not taken yet
+    refit_count: int = 0
+    refit_failed_count: int = 0
+
+    def take_readings(self) -> Readings:
+        """Hand over the locked readings that wait to be fitted, oldest first."""
+        taken = [self.to_fit.popleft() for _ in range(len(self.to_fit))]
+        return Readings(
+            np.array([reading.tai_s for reading in taken]),
+            np.array([reading.az_deg for reading in taken]),
+            np.array([reading.el_deg for reading in taken]),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """Everything people look at, at one instant."""
+
+    tai_s: float
+    state: str
+    az_deg: float | None
+    el_deg: float | None
+    reading_age_s: float | None
+    command_az_deg: float | None
+    command_el_deg: float | None
+    agc_db: float | None
+    is_acquired: bool
+    miss_deg: float | None  # reading against the prediction, on the sky; only while acquired
+    along_s: float | None
+    across_deg: float | None
+    fit_age_s: float | None
+    buffer_s: float
+    buffer_kind: str
+    lag_az_s: float
+    lag_el_s: float
+    tick_count: int
+    skipped_tick_count: int
+    write_count: int
+    refusal_count: int
+    is_link_up: bool
+    link_problem: str
+    is_rehearsal: bool
+    is_simulation: bool

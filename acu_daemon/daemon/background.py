@@ -1,0 +1,129 @@
+"""The background: fits the orbit to locked readings and keeps the prediction buffer filled (seed 001, 2.5)."""
+
+import asyncio
+from dataclasses import replace
+from typing import Any
+
+import structlog
+
+from acu_daemon.control.refit import RefitReply, RefitRequest
+from acu_daemon.control.state import PassPlan
+from acu_daemon.control.states import AUTOTRACKING, HOLDING, TrackState
+from acu_daemon.daemon.area import CommonArea
+from acu_daemon.edge.clock import Clock
+from acu_daemon.edge.fit import FitFailedError, FitRunner
+from acu_daemon.errors import OrbitError
+
+REFIT_PERIOD_S = 1.0  # an accepted fit replaces the buffer at least once a second while locked
+PAST_S = 1.0  # the buffer starts this long before now: readings are compared at the time of their sample
+RETRY_S = 0.5
+
+
+class Background:
+    """Owns the requests to the fit runner; the foreground only wakes it."""
+
+    def __init__(
+        self,
+        area: CommonArea,
+        runner: FitRunner,
+        clock: Clock,
+        *,
+        horizon_s: float,
+        low_water_s: float,
+        preposition_s: float,
+    ) -> None:
+        self._area = area
+        self._runner = runner
+        self._clock = clock
+        self._horizon_s = horizon_s
+        self._low_water_s = low_water_s
+        self._preposition_s = preposition_s
+        self._wake = asyncio.Event()
+        self._last_tai_s = -1e18
+        self._seen: TrackState | None = None
+        self._log: Any = structlog.get_logger("fit")
+
+    def wake(self) -> None:
+        """Look whether a refit is due.  Called by the foreground after every tick; never blocks."""
+        self._wake.set()
+
+    async def run(self) -> None:
+        while True:
+            await self._wake.wait()
+            self._wake.clear()
+            if self._is_due():
+                await self._refit()
+
+    def _is_due(self) -> bool:
+        """At once without a buffer or after a change of state that needs one; each second while locked; at low water."""
+        area, now_tai_s = self._area, self._clock.tai_s()
+        before, self._seen = self._seen, area.state.track
+        plan = area.sky.plan
+        if (
+            area.state.status is None
+            or plan is None
+            or now_tai_s < plan.rise_tai_s - self._preposition_s - REFIT_PERIOD_S
+        ):
+            return False
+        prediction = area.sky.prediction
+        is_loss = before in AUTOTRACKING and area.state.track in HOLDING
+        if prediction is None or is_loss:
+            return True
+        if area.to_fit and now_tai_s - self._last_tai_s >= REFIT_PERIOD_S:
+            return True
+        return prediction.end_tai_s - now_tai_s < self._low_water_s and now_tai_s - self._last_tai_s >= RETRY_S
+
+    async def _refit(self) -> None:
+        area = self._area
+        self._last_tai_s = self._clock.tai_s()
+        request = self._request(self._last_tai_s)
+        try:
+            reply = await self._runner.refit(request)
+        except (FitFailedError, OrbitError) as error:
+            area.refit_failed_count += 1
+            self._log.warning("fit.failed", reason=str(error))
+            return
+        self._take(reply)
+
+    def _request(self, now_tai_s: float) -> RefitRequest:
+        area = self._area
+        start_tai_s = now_tai_s - PAST_S
+        return RefitRequest(
+            readings=area.take_readings(),
+            start_tai_s=start_tai_s,
+            horizon_s=self._horizon_s + PAST_S,
+            now_tai_s=now_tai_s,
+            near_az_deg=self._near_az_deg(start_tai_s),
+        )
+
+    def _near_az_deg(self, tai_s: float) -> float:
+        """The turn on which the path continues: of the antenna while acquired, else of the last buffer, else of the plan."""
+        state, sky = self._area.state, self._area.sky
+        if sky.plan is not None and tai_s < sky.plan.start_tai_s:
+            return sky.plan.start_az_deg
+        point = sky.prediction.at(tai_s, follow=False) if sky.prediction else None
+        if point is not None and abs(point.az_deg - state.az_deg) < 180.0:
+            return point.az_deg
+        if state.track in AUTOTRACKING:
+            return state.az_deg
+        if point is not None:
+            return point.az_deg
+        return state.az_deg
+
+    def _take(self, reply: RefitReply) -> None:
+        area = self._area
+        if reply.fit is not None and area.sky.fit is None:
+            self._log.info(
+                "fit.first",
+                estimator=reply.fit.estimator,
+                readings=reply.fit.reading_count,
+                along_s=round(reply.fit.along_s, 3),
+                across_deg=round(reply.fit.across_deg, 4),
+            )
+        area.refit_count += 1
+        area.sky = replace(area.sky, prediction=reply.prediction, fit=reply.fit)
+
+    def set_plan(self, plan: PassPlan) -> None:
+        """Take the plan of the pass; the buffer is made for it from then on."""
+        self._area.sky = replace(self._area.sky, plan=plan)
+        self.wake()

@@ -1,0 +1,198 @@
+"""The foreground: every 0.1 s poll the ACU, store the reading, write the command registers.  Never waits for a fit."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import structlog
+
+from acu_daemon.assist.gate import Dwell
+from acu_daemon.control.causes import LINK_SILENCE_S, is_acquired
+from acu_daemon.control.state import ControlConfig, Event, Exchange, Observation
+from acu_daemon.control.tick import tick
+from acu_daemon.daemon.area import CommonArea
+from acu_daemon.daemon.port import AcuPort, Answer
+from acu_daemon.edge.clock import Clock
+from acu_daemon.model import Reading
+from acu_daemon.protocol.messages import (
+    Ack,
+    AcuMode,
+    Command,
+    Faults,
+    Identity,
+    Nak,
+    Poll,
+    SelectBackup,
+    SelectMode,
+    Status,
+    Stop,
+    WriteAndPoll,
+    WriteParameter,
+    WriteRegisters,
+)
+
+CLOCK_STEP_S = 0.1
+LATENESS_KEPT = 36000  # an hour of ticks
+NO_STOP_MODES = (AcuMode.MANUAL, AcuMode.STOWING, AcuMode.STOWED, AcuMode.FAULT)  # a stop would disturb, or do nothing
+
+
+class Foreground:
+    """Owns the ACU, the control state and the counts; one task runs it."""
+
+    def __init__(
+        self,
+        area: CommonArea,
+        port: AcuPort,
+        clock: Clock,
+        config: ControlConfig,
+        *,
+        after_tick: Callable[[], None],
+        on_reading: Callable[[Reading], None] | None = None,
+    ) -> None:
+        self._area = area
+        self._port = port
+        self._clock = clock
+        self._config = config
+        self._after_tick = after_tick
+        self._on_reading = on_reading
+        self._dwell = Dwell(config.lock_dwell_s)
+        self._seen = Observation()
+        self._log: Any = structlog.get_logger("tick")
+        self.identity: Identity | None = None
+        self.tick_count = 0
+        self.write_count = 0
+        self.skipped_tick_count = 0
+        self.clock_difference_s = 0.0
+        self._is_clock_stepped = False
+        self._lateness_s = np.zeros(LATENESS_KEPT)
+
+    @property
+    def lateness_s(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Lateness of the newest ticks, seconds, unordered."""
+        return self._lateness_s[: min(self.tick_count, LATENESS_KEPT)]
+
+    async def run(self) -> None:
+        """Tick at the tenths of UTC seconds; a late tick is counted and skipped, never sent in a burst."""
+        period_s = self._config.period_s
+        due_tai_s = math.ceil(self._clock.tai_s() / period_s + 1) * period_s
+        while True:
+            await self._clock.sleep_until(due_tai_s)
+            self._lateness_s[self.tick_count % LATENESS_KEPT] = self._clock.tai_s() - due_tai_s
+            self.tick_count += 1
+            await self._tick()
+            if self.tick_count % 10 == 0:
+                self._watch_clock()
+            self._after_tick()
+            missed = max(0, math.floor((self._clock.tai_s() - due_tai_s) / period_s))
+            self.skipped_tick_count += missed
+            due_tai_s = round(due_tai_s / period_s + 1 + missed) * period_s
+
+    async def _tick(self) -> None:
+        port, area = self._port, self._area
+        port.drop_if_silent(LINK_SILENCE_S)
+        seen = replace(self._seen, silence_s=self._silence_s(), must_poll=port.must_poll, has_room=port.has_room)
+        now_tai_s = self._clock.tai_s()
+        area.state, orders = tick(area.state, seen, area.sky, now_tai_s, self._config)
+        self._report(orders.events)
+        self._seen = Observation()
+        if not port.is_up:
+            return
+        await self._do(orders.first)
+        if orders.extra is not None and port.is_up and not port.must_poll:
+            await port.idle_gap()
+            await self._do(orders.extra)
+
+    def _silence_s(self) -> float:
+        return self._port.silence_s if self._port.is_up else math.inf
+
+    async def _do(self, command: Command) -> None:
+        """One exchange; what it brings is gathered for the next decision.  A NAK is followed by a poll at once."""
+        answer = await self._port.exchange(command)
+        if isinstance(command, WriteAndPoll) and isinstance(answer.reply, Status):
+            self.write_count += 1
+        if isinstance(answer.reply, Status):
+            self._take_status(answer, answer.reply, command)
+        elif isinstance(command, WriteAndPoll | Poll):
+            if isinstance(answer.reply, Nak):
+                self._seen = replace(self._seen, refused=answer.reply)
+                await self._poll_after_nak(command)
+        else:
+            self._seen = replace(self._seen, extra=Exchange(command, answer.reply))
+            self._report_extra(command, answer)
+            if isinstance(answer.reply, Nak):
+                await self._poll_after_nak(command)
+
+    async def _poll_after_nak(self, refused: Command) -> None:
+        self._log.warning("acu.nak", command=str(refused))
+        await self._port.idle_gap()
+        answer = await self._port.exchange(Poll())
+        if isinstance(answer.reply, Status):
+            self._take_status(answer, answer.reply, Poll())
+
+    def _take_status(self, answer: Answer, status: Status, command: Command) -> None:
+        """Tag the reading: start of the write, wire time and device delay, never after the first byte of the reply."""
+        delay_s = self._config.sample_delay_s
+        if isinstance(command, Poll):
+            delay_s = self._config.poll_sample_delay_s
+        sample_tai_s = answer.started_tai_s + delay_s
+        if answer.first_byte_tai_s is not None:
+            sample_tai_s = min(sample_tai_s, answer.first_byte_tai_s)
+        reading = Reading(sample_tai_s, status.az_deg, status.el_deg, is_acquired(status))
+        self._seen = replace(self._seen, status=status, reading=reading)
+        if self._dwell.is_locked(reading):
+            self._area.to_fit.append(reading)
+        if self._on_reading is not None:
+            self._on_reading(reading)
+
+    def _report(self, events: tuple[Event, ...]) -> None:
+        for event in events:
+            (self._log.warning if event.is_warning else self._log.info)(event.name, **event.fields)
+
+    def _report_extra(self, command: Command, answer: Answer) -> None:
+        if isinstance(answer.reply, Identity):
+            self.identity = answer.reply
+            self._log.info("acu.identified", identity=str(answer.reply), is_simulation=answer.reply.is_simulated)
+        elif isinstance(answer.reply, Faults):
+            self._log.warning("acu.faults", faults=answer.reply.texts())
+        elif isinstance(command, SelectMode | SelectBackup | WriteParameter | WriteRegisters) and isinstance(
+            answer.reply, Ack
+        ):
+            self._log.info("acu.command", command=str(command))
+
+    def _watch_clock(self) -> None:
+        """Follow the system clock slowly; a step is reported once and not obeyed."""
+        self.clock_difference_s = self._clock.follow()
+        is_stepped = abs(self.clock_difference_s) > CLOCK_STEP_S
+        if is_stepped != self._is_clock_stepped:
+            self._is_clock_stepped = is_stepped
+            if is_stepped:
+                self._log.warning(
+                    "clock.stepped",
+                    difference_s=round(self.clock_difference_s, 3),
+                    action="not obeyed until the next start",
+                )
+            else:
+                self._log.info("clock.back", difference_s=round(self.clock_difference_s, 4))
+
+    async def safe_stop(self) -> bool:
+        """Stop the antenna, unless it never obeyed us or somebody else moves it.  True: stopped, or nothing to stop."""
+        status = self._area.state.status
+        if self.write_count == 0 or status is None:
+            return True
+        if status.mode in NO_STOP_MODES or not status.is_remote_enabled:
+            self._log.info("stop.left_alone", mode=status.mode.name)
+            return True
+        for _ in range(5):
+            if self._port.must_poll:
+                await self._port.exchange(Poll())
+                await self._port.idle_gap()
+                continue
+            answer = await self._port.exchange(Stop())
+            if isinstance(answer.reply, Ack):
+                self._log.info("stop.done")
+                return True
+            await self._port.idle_gap()
+        self._log.warning("stop.unconfirmed", advice="the antenna may still follow its registers: look at the ACU")
+        return False

@@ -1,0 +1,53 @@
+"""The live line of a terminal: state, angles, error, correction, buffer; redrawn in place five times a second."""
+
+import sys
+from typing import TextIO
+
+from acu_daemon.daemon.area import Snapshot
+from acu_daemon.orbit.timescales import utc_text
+
+EVERY_TICKS = 2
+
+
+def live_text(seen: Snapshot) -> str:
+    """One line for people; what is not known is shown as a dash."""
+    mark = " ".join(
+        word for word, is_on in (("SIMULATION", seen.is_simulation), ("REHEARSAL", seen.is_rehearsal)) if is_on
+    )
+    if seen.is_link_up and seen.az_deg is not None and seen.el_deg is not None:
+        antenna = f"az {seen.az_deg:7.2f} el {seen.el_deg:6.2f}"
+    else:
+        antenna = "az       - el      -"
+    miss = f"miss {seen.miss_deg:5.3f} deg" if seen.miss_deg is not None else "miss     - deg"
+    if seen.along_s is not None and seen.across_deg is not None:
+        side = "late" if seen.along_s >= 0 else "early"
+        correction = f"{abs(seen.along_s):5.2f} s {side:5} {seen.across_deg:+6.3f} deg across"
+    else:
+        correction = "no fit yet"
+    return (
+        f"{utc_text(seen.tai_s, 1)[11:]} {seen.state:16} {antenna}  {miss}  {correction}  "
+        f"buffer {seen.buffer_s:4.0f} s {seen.buffer_kind:6} {mark}"
+    ).rstrip()
+
+
+class LiveLine:
+    """Draws the line on a terminal; the log clears it before it prints."""
+
+    def __init__(self, stream: TextIO = sys.stderr) -> None:
+        self._stream = stream
+        self._is_drawn = False
+        self._skip = 0
+
+    def show(self, seen: Snapshot) -> None:
+        self._skip = (self._skip + 1) % EVERY_TICKS
+        if self._skip == 0:
+            self._stream.write("\r\033[K" + live_text(seen))
+            self._stream.flush()
+            self._is_drawn = True
+
+    def clear(self) -> None:
+        """Take the line away, so that something else can be printed."""
+        if self._is_drawn:
+            self._stream.write("\r\033[K")
+            self._stream.flush()
+            self._is_drawn = False

@@ -1,0 +1,160 @@
+"""One exchange after another with the ACU, and the connection kept alive beside them (ICD sections 1 and 6)."""
+
+import asyncio
+import contextlib
+from collections import deque
+from dataclasses import dataclass
+from typing import Any
+
+import structlog
+
+from acu_daemon.edge.clock import Clock
+from acu_daemon.edge.link import Link
+from acu_daemon.errors import LinkError
+from acu_daemon.protocol.exchange import HostExchange
+from acu_daemon.protocol.messages import Command, Poll, Reply, WriteAndPoll
+from acu_daemon.protocol.sa3842 import cycle_s, exchange_bytes
+
+EXCHANGE_DEADLINE_S = 0.090  # a reply is complete within this of the start of the write, ICD section 1
+CYCLE_SHARE = 0.95  # an exchange goes beside the write only if both fit into this share of the period, ICD section 6
+FIRST_BACK_OFF_S = 0.1
+LAST_BACK_OFF_S = 5.0
+LONGEST_EXTRA = 18  # bytes of the longest housekeeping exchange that goes beside a write, ICD section 6
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What one exchange brought: the reply, or None at the deadline; and when its write started and its reply arrived."""
+
+    reply: Reply | None
+    started_tai_s: float
+    first_byte_tai_s: float | None
+
+
+class AcuPort:
+    """The ACU as the foreground sees it.  Owned by the foreground; `keep` runs as its own task."""
+
+    def __init__(self, link: Link, clock: Clock, address: int, period_s: float, device_delay_s: float) -> None:
+        self._link = link
+        self._clock = clock
+        self._address = address
+        self._exchange = HostExchange(address)
+        self._period_s = period_s
+        self._latencies_s: deque[float] = deque([device_delay_s], maxlen=100)
+        self._log: Any = structlog.get_logger("link")
+        self._reopen = asyncio.Event()
+        self.is_up = False
+        self.problem = ""
+        self.last_reply_s = clock.monotonic_s()
+        self.connect_count = 0
+        self.failed_exchange_count = 0
+
+    @property
+    def must_poll(self) -> bool:
+        return self._exchange.must_poll
+
+    @property
+    def silence_s(self) -> float:
+        """Seconds since the last valid reply."""
+        return self._clock.monotonic_s() - self.last_reply_s
+
+    @property
+    def discarded_count(self) -> int:
+        return self._exchange.discarded_count
+
+    @property
+    def garbled_count(self) -> int:
+        return self._exchange.garbled_count
+
+    @property
+    def has_room(self) -> bool:
+        """Whether the computed cycle leaves room for a second exchange beside the write (ICD section 6)."""
+        byte_s, latency_s = self._link.byte_time_s, max(self._latencies_s)
+        both_s = cycle_s((WriteAndPoll(0.0, 0.0),), byte_s, latency_s) + (LONGEST_EXTRA + 1) * byte_s + latency_s
+        return both_s <= CYCLE_SHARE * self._period_s
+
+    async def exchange(self, command: Command) -> Answer:
+        """Send a command and wait for its reply until the deadline; a dead link is reported and reopened by `keep`."""
+        started_s, started_tai_s = self._clock.monotonic_s(), self._clock.tai_s()
+        first_byte_s: float | None = None
+        reply: Reply | None = None
+        try:
+            self._link.drain_input()
+            self._link.write(self._exchange.begin(command))
+            async with asyncio.timeout(EXCHANGE_DEADLINE_S):
+                while reply is None:
+                    data, arrival_s = await self._link.read()
+                    first_byte_s = arrival_s if first_byte_s is None else first_byte_s
+                    reply = self._exchange.receive(data)
+        except TimeoutError:
+            pass
+        except LinkError as error:
+            self._drop(str(error))
+        if reply is None:
+            self._exchange.fail()
+            self.failed_exchange_count += 1
+            return Answer(None, started_tai_s, None)
+        self.last_reply_s = self._clock.monotonic_s()
+        wire_s = sum(exchange_bytes(command)) * self._link.byte_time_s
+        self._latencies_s.append(max(0.0, self.last_reply_s - started_s - wire_s))
+        first_byte_tai_s = None if first_byte_s is None else started_tai_s + first_byte_s - started_s
+        return Answer(reply, started_tai_s, first_byte_tai_s)
+
+    async def idle_gap(self) -> None:
+        """Leave 10 idle bit times before the next command (ICD section 1)."""
+        if self._link.byte_time_s > 0:
+            await asyncio.sleep(self._link.byte_time_s)
+
+    def drop_if_silent(self, limit_s: float) -> None:
+        """Close and reopen a link without a valid reply for this long, so that no unsent write arrives as a burst."""
+        if self.is_up and self.silence_s > limit_s:
+            self._drop(f"no valid reply for {self.silence_s:.1f} s")
+
+    def _drop(self, problem: str) -> None:
+        if self.is_up:
+            self.is_up = False
+            self.problem = problem
+            self._reopen.set()
+
+    async def keep(self) -> None:
+        """Open the link, and open it again whenever it was dropped, with a growing pause, for ever."""
+        pause_s = FIRST_BACK_OFF_S
+        reported = ""
+        try:
+            while True:
+                try:
+                    await self._link.open()
+                    await self._first_poll()
+                except LinkError as error:
+                    if str(error) != reported:
+                        reported = str(error)
+                        self._log.warning("link.closed", link=self._link.description, reason=reported)
+                    self.problem = str(error)
+                    await self._link.close()
+                    await asyncio.sleep(pause_s)
+                    pause_s = min(2 * pause_s, LAST_BACK_OFF_S)
+                    continue
+                pause_s, reported = FIRST_BACK_OFF_S, ""
+                self.connect_count += 1
+                self._log.info("link.open", link=self._link.description)
+                self._reopen.clear()
+                self.is_up = True
+                await self._reopen.wait()
+                self._log.warning("link.lost", link=self._link.description, reason=self.problem)
+                await self._link.close()
+        finally:
+            self.is_up = False
+            await self._link.close()
+
+    async def _first_poll(self) -> None:
+        """A link counts as up when the ACU has answered on it once."""
+        self._exchange = HostExchange(self._address)
+        for _ in range(3):
+            answer = await self.exchange(Poll())
+            if answer.reply is not None:
+                return
+        raise LinkError(self.problem or f"{self._link.description} is open, but no ACU answers a poll")
+
+    async def close(self) -> None:
+        with contextlib.suppress(LinkError):
+            await self._link.close()

@@ -1,0 +1,136 @@
+"""The clocks: CLOCK_MONOTONIC for intervals, TAI through one slowly followed offset for the sky (design section 5)."""
+
+import asyncio
+import ctypes
+import os
+import time
+from typing import Protocol
+
+from acu_daemon.orbit.timescales import tai_from_unix
+
+STEP_S = 0.1  # a jump of the system clock larger than this is reported and not obeyed
+FOLLOW_GAIN = 0.02  # of the difference to the system clock, each second: a drift is followed, a step is not
+
+_LIBC = ctypes.CDLL(None, use_errno=True)
+_TIMER_ABSOLUTE = 1
+_NONBLOCK_CLOEXEC = os.O_NONBLOCK | os.O_CLOEXEC
+
+
+class Clock(Protocol):
+    """Seam between the daemon and time."""
+
+    def monotonic_s(self) -> float: ...
+
+    def tai_s(self) -> float: ...
+
+    def follow(self) -> float:
+        """Follow the system's UTC for one second; return its difference to ours, seconds (0 where there is none)."""
+        ...
+
+    async def sleep_until(self, tai_s: float) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class Timerfd:
+    """A Linux timerfd on CLOCK_MONOTONIC: asyncio's own timer is 0.6 ms late by construction.  One waiter at a time."""
+
+    def __init__(self) -> None:
+        self._fd = _LIBC.timerfd_create(time.CLOCK_MONOTONIC, _NONBLOCK_CLOEXEC)
+        if self._fd < 0:
+            raise OSError(ctypes.get_errno(), "timerfd_create failed")
+
+    async def sleep_until(self, monotonic_s: float) -> None:
+        """Return at that reading of CLOCK_MONOTONIC, at once if it has passed."""
+        if monotonic_s <= time.monotonic():
+            await asyncio.sleep(0)
+            return
+        loop = asyncio.get_running_loop()
+        woken: asyncio.Future[None] = loop.create_future()
+        seconds = int(monotonic_s)
+        spec = (ctypes.c_long * 4)(0, 0, seconds, int((monotonic_s - seconds) * 1e9))
+        if _LIBC.timerfd_settime(self._fd, _TIMER_ABSOLUTE, ctypes.byref(spec), None) != 0:
+            raise OSError(ctypes.get_errno(), "timerfd_settime failed")
+        loop.add_reader(self._fd, self._wake, woken)
+        try:
+            await woken
+        finally:
+            loop.remove_reader(self._fd)
+
+    def _wake(self, woken: asyncio.Future[None]) -> None:
+        os.read(self._fd, 8)
+        if not woken.done():
+            woken.set_result(None)
+
+    def close(self) -> None:
+        os.close(self._fd)
+
+
+class SystemClock:
+    """Real time.  With at_tai_s: a rehearsal, whose TAI is at_tai_s at at_monotonic_s (default: now)."""
+
+    def __init__(self, at_tai_s: float | None = None, at_monotonic_s: float | None = None) -> None:
+        self.is_rehearsal = at_tai_s is not None
+        if at_tai_s is None:
+            self._offset_s = _system_offset_s()
+        else:
+            self._offset_s = at_tai_s - (time.monotonic() if at_monotonic_s is None else at_monotonic_s)
+        self._timer: Timerfd | None = None
+
+    def monotonic_s(self) -> float:
+        return time.monotonic()
+
+    def tai_s(self) -> float:
+        return time.monotonic() + self._offset_s
+
+    def follow(self) -> float:
+        if self.is_rehearsal:
+            return 0.0
+        difference_s = _system_offset_s() - self._offset_s
+        if abs(difference_s) < STEP_S:
+            self._offset_s += FOLLOW_GAIN * difference_s
+        return difference_s
+
+    async def sleep_until(self, tai_s: float) -> None:
+        if self._timer is None:
+            self._timer = Timerfd()
+        await self._timer.sleep_until(tai_s - self._offset_s)
+
+    def close(self) -> None:
+        if self._timer is not None:
+            self._timer.close()
+            self._timer = None
+
+
+class LoopClock:
+    """The running loop's own time, for tests in virtual time: TAI is at_tai_s when the clock is made."""
+
+    def __init__(self, at_tai_s: float) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._offset_s = at_tai_s - self._loop.time()
+
+    def monotonic_s(self) -> float:
+        return self._loop.time()
+
+    def tai_s(self) -> float:
+        return self._loop.time() + self._offset_s
+
+    def follow(self) -> float:
+        return 0.0
+
+    async def sleep_until(self, tai_s: float) -> None:
+        await asyncio.sleep(max(0.0, tai_s - self.tai_s()))
+
+    def close(self) -> None:
+        """Nothing to give back."""
+
+
+def _system_offset_s() -> float:
+    """TAI minus CLOCK_MONOTONIC by the system clock; the quickest of three looks, so that a stall does not count."""
+    looks = []
+    for _ in range(3):
+        before = time.monotonic()
+        unix_s = time.time()
+        after = time.monotonic()
+        looks.append((after - before, tai_from_unix(unix_s) - (before + after) / 2))
+    return min(looks)[1]

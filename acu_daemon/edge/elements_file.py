@@ -1,0 +1,76 @@
+"""From a satellite's TOML to a propagator: reads the file of elements it names, chooses the set, checks it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from acu_daemon.config import BrouwerSection, ElementsFileSection, SatelliteFile
+from acu_daemon.errors import ElementsError
+from acu_daemon.orbit.brouwer import BrouwerElements, BrouwerPropagator
+from acu_daemon.orbit.elements import check_brouwer, check_elements, select_elements
+from acu_daemon.orbit.omm import parse_omm
+from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.orbit.sgp4_source import Sgp4Propagator
+from acu_daemon.orbit.tle import parse_tle
+from acu_daemon.units import DEG
+
+_PARSERS = {"tle": parse_tle, "omm": parse_omm}
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedElements:
+    """A propagator with what has to be said about its elements: errors forbid a pass, warnings do not."""
+
+    propagator: Propagator
+    label: str
+    epoch_tai_s: float
+    errors: list[str]
+    warnings: list[str]
+
+
+def load_elements(satellite: SatelliteFile, toml_path: Path, now_tai_s: float) -> LoadedElements:
+    """Make the satellite's propagator.  Raises: ElementsError: names file, line and reason."""
+    section = satellite.elements
+    if isinstance(section, BrouwerSection):
+        return _from_brouwer(satellite, section, toml_path, now_tai_s)
+    return _from_file(satellite, section, toml_path, now_tai_s)
+
+
+def _from_brouwer(
+    satellite: SatelliteFile, section: BrouwerSection, toml_path: Path, now_tai_s: float
+) -> LoadedElements:
+    elements = BrouwerElements(
+        name=satellite.satellite.name,
+        epoch_tai_s=section.epoch_utc,
+        a_m=section.semi_major_axis_km * 1e3,
+        e=section.eccentricity,
+        i_rad=section.inclination_deg * DEG,
+        raan_rad=section.raan_deg * DEG,
+        argp_rad=section.arg_perigee_deg * DEG,
+        mean_anomaly_rad=section.mean_anomaly_deg * DEG,
+    )
+    errors, warnings = check_brouwer(elements, section.limits.limits(), now_tai_s, str(toml_path))
+    propagator = BrouwerPropagator(elements, section.short_period)
+    return LoadedElements(propagator, elements.name, elements.epoch_tai_s, errors, warnings)
+
+
+def _from_file(
+    satellite: SatelliteFile, section: ElementsFileSection, toml_path: Path, now_tai_s: float
+) -> LoadedElements:
+    if section.kind not in _PARSERS:
+        raise ElementsError(f'{toml_path}: elements.kind = "{section.kind}" is not read yet; use "tle" or "omm"')
+    path = toml_path.parent / section.file
+    try:
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise ElementsError(f"{toml_path}: elements.file = {section.file!r}: {path}: {error.strerror}") from None
+    sets, problems = _PARSERS[section.kind](text, str(path))
+    if not sets:
+        reasons = "\n".join(str(problem) for problem in problems[:5])
+        raise ElementsError(reasons or f"{path}: no element set in the file")
+    try:
+        chosen, warnings = select_elements(sets, satellite.satellite.norad_id, satellite.satellite.name, now_tai_s)
+    except ElementsError as error:
+        raise ElementsError("\n".join([str(error), *(str(problem) for problem in problems[:5])])) from None
+    errors, more = check_elements(chosen, section.limits.limits(), now_tai_s)
+    warnings = [*warnings, *more, *(str(problem) for problem in problems)]
+    return LoadedElements(Sgp4Propagator(chosen), chosen.label, chosen.epoch_tai_s, errors, warnings)

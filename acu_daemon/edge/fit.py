@@ -1,0 +1,171 @@
+"""The fit runner: a spawned, niced child process, or inline with a fixed virtual latency (design section 2).
+
+The child speaks length-prefixed pickles over its standard input and output; nothing but this program writes to it.
+The foreground never waits for it; a child that dies or hangs is replaced and given the pass's readings again.
+"""
+
+import asyncio
+import contextlib
+import os
+import pickle
+import signal
+import struct
+import sys
+from typing import Any, Protocol
+
+import numpy as np
+
+from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup, Refitter
+from acu_daemon.errors import AcuDaemonError, OrbitError
+from acu_daemon.model import Readings
+
+_LENGTH = struct.Struct("<Q")
+NICENESS = 10
+
+
+class FitFailedError(AcuDaemonError):
+    """The child died, hung, or could not do what was asked; the message says which."""
+
+
+class FitRunner(Protocol):
+    """Seam between the background task and whoever computes."""
+
+    async def refit(self, request: RefitRequest) -> RefitReply: ...
+
+    async def close(self) -> None: ...
+
+
+class InlineFitRunner:
+    """Computes in the loop and answers after a fixed latency of the loop's (virtual) time."""
+
+    def __init__(self, setup: RefitSetup, latency_s: float = 0.05) -> None:
+        self._refitter = Refitter(setup)
+        self._latency_s = latency_s
+
+    async def refit(self, request: RefitRequest) -> RefitReply:
+        reply = self._refitter.refit(request)
+        await asyncio.sleep(self._latency_s)
+        return reply
+
+    async def close(self) -> None:
+        """Nothing runs."""
+
+
+class ProcessFitRunner:
+    """Computes in a child process.  One request at a time; owned by the background task."""
+
+    def __init__(self, setup: RefitSetup, timeout_s: float = 5.0) -> None:
+        self._setup = setup
+        self._timeout_s = timeout_s
+        self._child: asyncio.subprocess.Process | None = None
+        self._given: list[Readings] = []
+        self.start_count = 0
+
+    async def refit(self, request: RefitRequest) -> RefitReply:
+        """Ask the child.  Raises: FitFailedError, after which the next call starts a new child."""
+        if len(request.readings):
+            self._given.append(request.readings)
+        try:
+            async with asyncio.timeout(self._timeout_s):
+                if self._child is None or self._child.returncode is not None:
+                    await self._start()
+                    request = _with_readings(request, self._given)
+                await self._send(request)
+                reply = await self._receive()
+        except TimeoutError:
+            await self.close()
+            raise FitFailedError(f"the fit process gave no answer within {self._timeout_s:g} s") from None
+        except (OSError, asyncio.IncompleteReadError) as error:
+            await self.close()
+            raise FitFailedError(f"the fit process died: {error}") from None
+        except BaseException:
+            await self.close()  # cancelled in mid-answer: what the child still says must not meet the next question
+            raise
+        if isinstance(reply, RefitReply):
+            return reply
+        raise FitFailedError(str(reply))
+
+    @property
+    def pid(self) -> int | None:
+        """Process number of the child, for tests and reports."""
+        return self._child.pid if self._child else None
+
+    async def _start(self) -> None:
+        self._child = await asyncio.create_subprocess_exec(
+            sys.executable,
+            "-m",
+            "acu_daemon.edge.fit",
+            stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.PIPE,
+            limit=2**22,
+        )
+        self.start_count += 1
+        await self._send(self._setup)
+
+    async def _send(self, message: object) -> None:
+        if self._child is None or self._child.stdin is None:
+            raise OSError("no child")
+        data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
+        self._child.stdin.write(_LENGTH.pack(len(data)) + data)
+        await self._child.stdin.drain()
+
+    async def _receive(self) -> Any:
+        if self._child is None or self._child.stdout is None:
+            raise OSError("no child")
+        (size,) = _LENGTH.unpack(await self._child.stdout.readexactly(_LENGTH.size))
+        return pickle.loads(await self._child.stdout.readexactly(size))
+
+    async def close(self) -> None:
+        """End the child."""
+        child, self._child = self._child, None
+        if child is None:
+            return
+        if child.returncode is None:
+            with contextlib.suppress(ProcessLookupError):
+                child.kill()
+        await child.wait()
+
+
+def _with_readings(request: RefitRequest, given: list[Readings]) -> RefitRequest:
+    if not given:
+        return request
+    together = Readings(
+        np.concatenate([part.tai_s for part in given]),
+        np.concatenate([part.az_deg for part in given]),
+        np.concatenate([part.el_deg for part in given]),
+    )
+    return RefitRequest(together, request.start_tai_s, request.horizon_s, request.now_tai_s, request.near_az_deg)
+
+
+def _read(size: int) -> bytes:
+    data = sys.stdin.buffer.read(size)
+    if len(data) < size:
+        raise EOFError
+    return data
+
+
+def _receive() -> Any:
+    (size,) = _LENGTH.unpack(_read(_LENGTH.size))
+    return pickle.loads(_read(size))
+
+
+def _child() -> None:
+    """Serve requests until the parent closes the pipe."""
+    os.nice(NICENESS)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a Ctrl-C is for the daemon, which ends the child itself
+    refitter = Refitter(_receive())
+    while True:
+        request: RefitRequest = _receive()
+        reply: RefitReply | str
+        try:
+            reply = refitter.refit(request)
+        except (OrbitError, ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
+            reply = f"the fit failed: {error}"
+        data = pickle.dumps(reply, protocol=pickle.HIGHEST_PROTOCOL)
+        sys.stdout.buffer.write(_LENGTH.pack(len(data)) + data)
+        sys.stdout.buffer.flush()
+
+
+if __name__ == "__main__":
+    with contextlib.suppress(EOFError, BrokenPipeError):
+        _child()

@@ -1,0 +1,62 @@
+"""structlog: JSON lines to standard output for a service, readable lines for a terminal.  Changes, not ticks."""
+
+import logging
+import sys
+from collections.abc import Callable, MutableMapping
+from typing import Any
+
+import structlog
+
+from acu_daemon.orbit.timescales import utc_text
+
+Entry = MutableMapping[str, Any]
+
+
+def configure_logs(
+    now_tai_s: Callable[[], float],
+    *,
+    tags: dict[str, Any],
+    is_terminal: bool,
+    before_line: Callable[[], None] | None = None,
+) -> None:
+    """Set up the logs once.
+
+    now_tai_s stamps every line with the daemon's own UTC; tags (SIMULATION, REHEARSAL) stand on every line; before_line
+    clears the live line of a terminal first.
+    """
+
+    def stamp(_logger: Any, _name: str, entry: Entry) -> Entry:
+        return {"utc": utc_text(now_tai_s()), **entry, **tags}
+
+    def readable(_logger: Any, name: str, entry: Entry) -> str:
+        if before_line is not None:
+            before_line()
+        return _readable(name, entry)
+
+    render: Any = readable if is_terminal else structlog.processors.JSONRenderer(default=str)
+    structlog.configure(
+        processors=[structlog.processors.add_log_level, stamp, render],
+        wrapper_class=structlog.make_filtering_bound_logger(logging.INFO),
+        logger_factory=_OutputFactory(),
+        cache_logger_on_first_use=False,
+    )
+
+
+class _OutputFactory:
+    """Loggers that print to standard output; the positional name becomes a field of every line."""
+
+    def __call__(self, *_names: Any) -> Any:
+        return structlog.PrintLogger(file=sys.stdout)
+
+
+def _readable(level: str, entry: Entry) -> str:
+    utc, event = str(entry.pop("utc")), str(entry.pop("event"))
+    entry.pop("level", None)
+    mark = {"warning": "!", "error": "!!"}.get(level, " ")
+    shown = [f"{key}={_short(value)}" for key, value in entry.items() if value is not True]
+    shown += [key for key, value in entry.items() if value is True]
+    return f"{utc[11:21]} {mark:2} {event:20} {'  '.join(shown)}"
+
+
+def _short(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
