@@ -1,0 +1,126 @@
+"""The ACU's bytes over a serial line: RS-232 or RS-422, or a pseudo terminal (ICD section 1)."""
+
+import asyncio
+import contextlib
+import errno
+import os
+import termios
+from collections.abc import Callable
+
+import serial
+
+from acu_daemon.edge.arrivals import Arrivals
+from acu_daemon.errors import LinkError, LinkRefusedError
+
+READ_BYTES = 4096
+CHARACTER_FORMATS = {"8N1": (serial.EIGHTBITS, serial.PARITY_NONE), "7E1": (serial.SEVENBITS, serial.PARITY_EVEN)}
+
+
+class SerialLink:
+    """A serial port, held exclusively; can be opened again after close()."""
+
+    def __init__(self, path: str, baud: int, character_format: str, monotonic: Callable[[], float]) -> None:
+        self._path, self._baud, self._format = path, baud, character_format
+        self._monotonic = monotonic
+        self.byte_time_s = 10.0 / baud
+        self.description = f"serial://{path}?baud={baud}&format={character_format}"
+        self._port: serial.Serial | None = None
+        self._arrivals = Arrivals()
+        self._unsent = b""
+
+    async def open(self) -> None:
+        """Open the port exclusively.  LinkRefusedError: another program holds it; LinkError: there is no such port."""
+        bytesize, parity = CHARACTER_FORMATS[self._format]
+        try:
+            port = serial.Serial(self._path, self._baud, bytesize, parity, timeout=0, write_timeout=0, exclusive=True)
+        except serial.SerialException as error:
+            raise self._open_error(error) from None
+        except termios.error as error:
+            raise LinkError(f"{self._path} cannot do {self._baud} baud {self._format}: {error.args[-1]}") from None
+        with contextlib.suppress(OSError, ValueError, NotImplementedError):
+            port.set_low_latency_mode(True)  # an FTDI adapter otherwise adds 16 ms to every reply
+        os.set_blocking(port.fileno(), False)
+        port.reset_input_buffer()
+        self._port, self._arrivals, self._unsent = port, Arrivals(), b""
+        asyncio.get_running_loop().add_reader(port.fileno(), self._on_readable)
+
+    def _open_error(self, error: serial.SerialException) -> LinkError:
+        if error.errno in (errno.EAGAIN, errno.EBUSY):
+            return LinkRefusedError(f"{self._path} is held by another program; stop it first")
+        hint = {
+            errno.ENOENT: "no such device; is the adapter plugged in?",
+            errno.EACCES: "no permission; the user must be in the device's group, usually dialout",
+        }.get(error.errno or 0, str(error))
+        return LinkError(f"{self._path} cannot be opened: {hint}")
+
+    def write(self, data: bytes) -> None:
+        """Send; never waits, what the port does not take at once follows.  LinkError: the port is gone."""
+        port = self._opened()
+        self._unsent += data
+        self._send_more(port)
+
+    def _send_more(self, port: serial.Serial) -> None:
+        loop = asyncio.get_running_loop()
+        try:
+            sent_count = os.write(port.fileno(), self._unsent)
+        except BlockingIOError:
+            sent_count = 0
+        except OSError as error:
+            loop.remove_writer(port.fileno())
+            self._unsent = b""
+            self._hang_up(error)
+            return
+        self._unsent = self._unsent[sent_count:]
+        if self._unsent:
+            loop.add_writer(port.fileno(), self._send_more, port)
+        else:
+            loop.remove_writer(port.fileno())
+
+    async def read(self) -> tuple[bytes, float]:
+        """Wait for the next bytes and their arrival time.  LinkError: the line hung up."""
+        self._opened()
+        return await self._arrivals.get()
+
+    def drain_input(self) -> None:
+        """Throw away what has arrived and was not read."""
+        port = self._opened()
+        self._arrivals.clear()
+        with contextlib.suppress(OSError, termios.error):
+            port.reset_input_buffer()
+
+    async def close(self) -> None:
+        """Close at once; what has not gone out never does."""
+        port, self._port = self._port, None
+        if port is None:
+            return
+        loop = asyncio.get_running_loop()
+        loop.remove_reader(port.fileno())
+        loop.remove_writer(port.fileno())
+        with contextlib.suppress(OSError, termios.error):
+            port.reset_output_buffer()
+        with contextlib.suppress(OSError, termios.error):
+            port.close()
+
+    def _on_readable(self) -> None:
+        port = self._opened()
+        try:
+            data = os.read(port.fileno(), READ_BYTES)
+        except BlockingIOError:
+            return
+        except OSError as error:
+            self._hang_up(error)
+            return
+        if data:
+            self._arrivals.put(data, self._monotonic())
+        else:
+            self._hang_up(None)
+
+    def _hang_up(self, error: OSError | None) -> None:
+        asyncio.get_running_loop().remove_reader(self._opened().fileno())
+        reason = f" ({error.strerror})" if error else ""
+        self._arrivals.fail(LinkError(f"{self._path} hung up{reason}: is the adapter still plugged in?"))
+
+    def _opened(self) -> serial.Serial:
+        if self._port is None:
+            raise LinkError(f"{self.description} is not open")
+        return self._port

@@ -1,0 +1,111 @@
+"""The ACU's bytes over TCP (ICD section 1)."""
+
+import asyncio
+import contextlib
+import socket
+import struct
+from collections.abc import Callable
+
+from acu_daemon.edge.arrivals import Arrivals
+from acu_daemon.errors import LinkError, LinkRefusedError
+
+CONNECT_TIMEOUT_S = 2.0
+_DROP_UNSENT = struct.pack("ii", 1, 0)  # SO_LINGER on, 0 s: close() throws away what has not arrived
+
+
+class TcpLink:
+    """A TCP connection to an ACU or to a terminal server in front of it; can be opened again after close()."""
+
+    def __init__(self, host: str, port: int, byte_time_s: float, monotonic: Callable[[], float]) -> None:
+        self._host, self._port = host, port
+        self._monotonic = monotonic
+        self.byte_time_s = byte_time_s
+        self.description = f"tcp://{f'[{host}]' if ':' in host else host}:{port}"
+        self._connection: _Connection | None = None
+
+    async def open(self) -> None:
+        """Connect.  LinkRefusedError: nobody listens; LinkError: no way there."""
+        loop = asyncio.get_running_loop()
+        connection = _Connection(self.description, self._monotonic)
+        try:
+            async with asyncio.timeout(CONNECT_TIMEOUT_S):
+                await loop.create_connection(lambda: connection, self._host, self._port)
+        except TimeoutError:
+            raise LinkError(
+                f"{self.description} does not answer within {CONNECT_TIMEOUT_S:g} s: "
+                "check the address, that the ACU is on, and that no firewall drops the connection"
+            ) from None
+        except ConnectionRefusedError:
+            raise LinkRefusedError(
+                f"nobody listens at {self.description}: check the port, and that the ACU or the simulator is on"
+            ) from None
+        except OSError as error:
+            raise LinkError(f"{self.description} cannot be reached: {error.strerror or error}") from None
+        self._connection = connection
+
+    def write(self, data: bytes) -> None:
+        """Send; never waits.  LinkError: not connected."""
+        self._connected().write(data)
+
+    async def read(self) -> tuple[bytes, float]:
+        """Wait for the next bytes and their arrival time.  LinkError: the other side closed."""
+        return await self._connected().arrivals.get()
+
+    def drain_input(self) -> None:
+        """Throw away what has arrived and was not read."""
+        self._connected().arrivals.clear()
+
+    async def close(self) -> None:
+        """Close at once; what an unanswered exchange still had to send never goes out."""
+        connection, self._connection = self._connection, None
+        if connection is not None:
+            await connection.close()
+
+    def _connected(self) -> "_Connection":
+        if self._connection is None:
+            raise LinkError(f"{self.description} is not open")
+        return self._connection
+
+
+class _Connection(asyncio.Protocol):
+    def __init__(self, description: str, monotonic: Callable[[], float]) -> None:
+        self._description = description
+        self._monotonic = monotonic
+        self._transport: asyncio.Transport | None = None
+        self._closed = asyncio.Event()
+        self._is_answer_due = False
+        self.arrivals = Arrivals()
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        if isinstance(transport, asyncio.Transport):
+            self._transport = transport
+        transport.get_extra_info("socket").setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def data_received(self, data: bytes) -> None:
+        self._is_answer_due = False
+        self.arrivals.put(data, self._monotonic())
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._closed.set()
+        if self.arrivals.has_had_any:
+            self.arrivals.fail(LinkError(f"{self._description} was closed by the other side"))
+        else:
+            self.arrivals.fail(
+                LinkRefusedError(f"{self._description} was closed at once: another client holds the ACU; stop it first")
+            )
+
+    def write(self, data: bytes) -> None:
+        if self._transport is None or self._transport.is_closing():
+            raise LinkError(f"{self._description} is closed")
+        self._is_answer_due = True
+        self._transport.write(data)
+
+    async def close(self) -> None:
+        if self._transport is None:
+            return
+        if self._is_answer_due:
+            with contextlib.suppress(OSError):
+                sock = self._transport.get_extra_info("socket")
+                sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _DROP_UNSENT)
+        self._transport.abort()
+        await self._closed.wait()

@@ -1,0 +1,229 @@
+"""The links over a real TCP socket and a real pseudo terminal pair; no timing is asserted."""
+
+import asyncio
+import os
+import tty
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import pytest
+import serial
+
+from acu_daemon.edge.link import check_rate, make_link
+from acu_daemon.edge.serial_port import SerialLink
+from acu_daemon.errors import LinkError, LinkRefusedError, UsageError
+
+Handler = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
+
+
+async def read_bytes(link: object, count: int) -> bytes:
+    data = b""
+    while len(data) < count:
+        chunk, _ = await link.read()  # type: ignore[attr-defined]
+        data += chunk
+    return data
+
+
+async def tcp_server(handler: Handler) -> tuple[asyncio.Server, str]:
+    server = await asyncio.start_server(handler, "127.0.0.1", 0)
+    return server, f"tcp://127.0.0.1:{server.sockets[0].getsockname()[1]}"
+
+
+async def test_bytes_go_both_ways_over_tcp_with_the_time_of_their_arrival() -> None:
+    async def echo(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        while data := await reader.read(100):
+            writer.write(data.upper())
+        writer.close()
+
+    server, url = await tcp_server(echo)
+    async with server:
+        link = make_link(url, monotonic=lambda: 42.0)
+        for _ in range(2):
+            await link.open()
+            link.write(b"hello")
+            assert await read_bytes(link, 5) == b"HELLO"
+            link.write(b"x")
+            assert await link.read() == (b"X", 42.0)
+            await link.close()
+
+
+async def test_an_acu_held_by_another_client_is_told_from_a_lost_line() -> None:
+    async def close_at_once(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.close()
+
+    async def speak_and_close(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.write(b"x")
+        writer.close()
+
+    for handler, error, text in (
+        (close_at_once, LinkRefusedError, "another client holds the ACU"),
+        (speak_and_close, LinkError, "closed by the other side"),
+    ):
+        server, url = await tcp_server(handler)
+        async with server:
+            link = make_link(url)
+            await link.open()
+            with pytest.raises(error, match=text):
+                while True:
+                    await link.read()
+            await link.close()
+
+
+async def test_a_port_where_nobody_listens_is_refused_with_advice() -> None:
+    server, url = await tcp_server(lambda reader, writer: asyncio.sleep(0))
+    server.close()
+    await server.wait_closed()
+    with pytest.raises(LinkRefusedError, match="nobody listens"):
+        await make_link(url).open()
+
+
+async def test_a_closed_link_says_so_and_closing_twice_is_harmless() -> None:
+    for link in (make_link("tcp://127.0.0.1:1"), make_link("serial:///dev/null")):
+        with pytest.raises(LinkError, match="not open"):
+            link.write(b"x")
+        await link.close()
+        await link.close()
+
+
+async def test_drained_input_is_never_read() -> None:
+    async def speak(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.write(b"old")
+        await reader.readexactly(1)
+        writer.write(b"new")
+        writer.close()
+
+    server, url = await tcp_server(speak)
+    async with server:
+        link = make_link(url)
+        await link.open()
+        await link.read()
+        link.drain_input()
+        link.write(b"x")
+        assert await read_bytes(link, 3) == b"new"
+        await link.close()
+
+
+class Pty:
+    """A pseudo terminal pair; the test holds the master."""
+
+    def __init__(self) -> None:
+        self.master, slave = os.openpty()
+        tty.setraw(slave)
+        self.path = os.ttyname(slave)
+        self.slave = slave
+
+    def close(self) -> None:
+        os.close(self.slave)
+        if self.master >= 0:
+            os.close(self.master)
+
+    def hang_up(self) -> None:
+        os.close(self.master)
+        self.master = -1
+
+
+@pytest.fixture
+def pty() -> object:
+    pair = Pty()
+    yield pair
+    pair.close()
+
+
+@pytest.mark.parametrize("options", ["", "?baud=19200&format=8N1"])
+async def test_bytes_go_both_ways_over_a_pseudo_terminal(pty: Pty, options: str) -> None:
+    link = make_link(f"serial://{pty.path}{options}", monotonic=lambda: 7.0)
+    for _ in range(2):
+        await link.open()
+        every_byte = bytes(range(256))
+        link.write(every_byte)
+        assert os.read(pty.master, 300) == every_byte
+        os.write(pty.master, every_byte)
+        assert await link.read() == (every_byte, 7.0)
+        await link.close()
+
+
+async def test_a_write_larger_than_the_port_takes_goes_out_in_pieces(pty: Pty) -> None:
+    link = make_link(f"serial://{pty.path}")
+    await link.open()
+    data = bytes(200_000)
+    link.write(data)
+    os.set_blocking(pty.master, False)
+    got = 0
+    while got < len(data):
+        try:
+            got += len(os.read(pty.master, 65536))
+        except BlockingIOError:
+            await asyncio.sleep(0)
+    await link.close()
+
+
+async def test_a_serial_line_that_hangs_up_is_a_link_error(pty: Pty) -> None:
+    link = make_link(f"serial://{pty.path}")
+    await link.open()
+    pty.hang_up()
+    with pytest.raises(LinkError, match="hung up"):
+        await link.read()
+    await link.close()
+
+
+async def test_a_serial_port_is_opened_exclusively(pty: Pty) -> None:
+    first, second = make_link(f"serial://{pty.path}"), make_link(f"serial://{pty.path}")
+    await first.open()
+    with pytest.raises(LinkRefusedError, match="another program"):
+        await second.open()
+    await first.close()
+    await second.open()
+    await second.close()
+
+
+async def test_a_missing_port_is_named_with_a_hint(tmp_path: Path) -> None:
+    with pytest.raises(LinkError, match="is the adapter plugged in"):
+        await make_link(f"serial://{tmp_path}/ttyUSB9").open()
+
+
+async def test_seven_bits_with_parity_are_asked_of_the_port(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: dict[str, object] = {}
+
+    class Port(serial.Serial):
+        def __init__(self, path: str, baud: int, bytesize: int, parity: str, **others: object) -> None:
+            asked.update(baud=baud, bytesize=bytesize, parity=parity)
+            super().__init__(path, baud, bytesize, parity, **others)
+
+    monkeypatch.setattr("acu_daemon.edge.serial_port.serial.Serial", Port)
+    link = make_link(f"serial://{pty.path}?format=7E1&baud=38400")
+    await link.open()
+    assert asked == {"baud": 38400, "bytesize": 7, "parity": "E"}
+    await link.close()
+
+
+@pytest.mark.parametrize(
+    ("url", "text"),
+    [
+        ("udp://127.0.0.1:1", "expected tcp://"),
+        ("tcp://127.0.0.1", "host and port"),
+        ("tcp://127.0.0.1:99999", "host and port"),
+        ("tcp://127.0.0.1:1/x", "host and port"),
+        ("tcp://127.0.0.1:1?bauds=9600", "unknown option 'bauds'"),
+        ("serial://ttyUSB0", "not absolute"),
+        ("serial:///dev/ttyUSB0?baud=9601", "expected one of"),
+        ("serial:///dev/ttyUSB0?format=8E2", "8N1 or 7E1"),
+    ],
+)
+def test_a_link_that_is_not_understood_says_what_is_expected(url: str, text: str) -> None:
+    with pytest.raises(UsageError, match=text):
+        make_link(url)
+
+
+def test_the_time_of_a_character_comes_from_the_baud_rate_named_in_the_url() -> None:
+    assert make_link("tcp://acu:3842").byte_time_s == 0.0
+    assert make_link("tcp://acu:3842?baud=9600").byte_time_s == pytest.approx(1.0417e-3, abs=1e-7)
+    link = make_link("serial:///dev/ttyS0?baud=19200&format=7E1")
+    assert isinstance(link, SerialLink)
+    assert link.byte_time_s == pytest.approx(0.52083e-3, abs=1e-8)
+
+
+def test_a_rate_that_cannot_carry_the_cycle_is_refused_with_the_arithmetic() -> None:
+    check_rate(make_link("tcp://acu:3842"), 0.1, 0.010)
+    check_rate(make_link("serial:///dev/ttyS0"), 0.1, 0.020)
+    with pytest.raises(UsageError, match=r"46 characters of 2\.083 ms and 10 ms .* make 105\.8 ms, and only 95 ms"):
+        check_rate(make_link("serial:///dev/ttyS0?baud=4800"), 0.1, 0.010)
