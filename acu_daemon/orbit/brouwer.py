@@ -45,7 +45,7 @@ class SecularRates:
 def secular_rates(a_m: float, e: float, i_rad: float) -> SecularRates:
     """Rates of the mean angles from mean elements.
 
-    Source:  Brouwer 1959, the secular terms of l'', g'', h'' (p. 394); the gammas and eta as there.
+    Source:  Brouwer 1959, the secular terms of l'', g'', h''; the gammas and eta as there.
     """
     n = sqrt(MU_M3_S2 / a_m**3)
     eta = sqrt(1.0 - e * e)
@@ -163,7 +163,7 @@ def _osculating_hill(mean: OsculatingElements) -> _Hill:
         W = -G eps [ (1 - 3/2 s^2) (f - M + sigma) + s^2 ((3/4 + kappa) sin 2u - 1/2 sigma cos 2u) ],
         eps = k2/p^2, kappa = p/r - 1 = e cos f, sigma = p R/G = e sin f, s = sin i.
 
-    Source:  Brouwer 1959, determining function S1 (p. 385), rewritten in Hill variables as by Izsak, AJ 68 (1963) 559.
+    Source:  Brouwer 1959, determining function S1, rewritten in Hill variables as by Izsak, AJ 68 (1963) 559.
     """
     r, latitude, raan, radial, momentum, polar = _mean_hill(mean)
     eta = np.sqrt(1.0 - mean.e**2)
