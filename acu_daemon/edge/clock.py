@@ -13,6 +13,8 @@ FOLLOW_GAIN = 0.02  # of the difference to the system clock, each second: a drif
 
 _LIBC = ctypes.CDLL(None, use_errno=True)
 _TIMER_ABSOLUTE = 1
+_TIME_ERROR = 5  # adjtimex: the clock is not synchronised
+_TIMEX_BYTES = 512  # more than struct timex; all zero asks and sets nothing
 _NONBLOCK_CLOEXEC = os.O_NONBLOCK | os.O_CLOEXEC
 
 
@@ -134,3 +136,9 @@ def _system_offset_s() -> float:
         after = time.monotonic()
         looks.append((after - before, tai_from_unix(unix_s) - (before + after) / 2))
     return min(looks)[1]
+
+
+def is_clock_synchronised() -> bool:
+    """Whether the kernel's clock discipline (chrony, ntpd) reports a synchronised clock (adjtimex(2))."""
+    status = _LIBC.adjtimex(ctypes.create_string_buffer(_TIMEX_BYTES))
+    return status not in (-1, _TIME_ERROR)

@@ -1,0 +1,13 @@
+FROM python:3.11-slim
+RUN useradd --system --create-home --home-dir /var/lib/acu-daemon --groups dialout acu
+WORKDIR /opt/acu-daemon
+COPY pyproject.toml constraints.txt README.md LICENSE ./
+COPY acu_daemon acu_daemon
+RUN pip install --no-cache-dir --constraint constraints.txt .
+USER acu
+ENV STATE_DIRECTORY=/var/lib/acu-daemon
+VOLUME ["/etc/acu-daemon"]
+# Healthy: the daemon in this container has ticked within the last seconds.
+HEALTHCHECK --interval=30s --timeout=10s CMD ["acu-daemon", "check", "--config", "/etc/acu-daemon", "--running"]
+ENTRYPOINT ["acu-daemon"]
+CMD ["--help"]

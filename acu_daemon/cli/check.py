@@ -1,0 +1,195 @@
+"""`acu-daemon check`: go or no-go before a pass, a line per check."""
+
+import asyncio
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from acu_daemon.cli.options import Config, Target, load_target
+from acu_daemon.config import load_station, satellite_names
+from acu_daemon.control.plan import plan_pass
+from acu_daemon.edge.clock import SystemClock, is_clock_synchronised
+from acu_daemon.edge.link import check_rate, make_link
+from acu_daemon.edge.state import SNAPSHOT, state_directory
+from acu_daemon.errors import AcuDaemonError, LinkError, UsageError
+from acu_daemon.orbit.passes import find_passes
+from acu_daemon.orbit.timescales import utc_text
+from acu_daemon.protocol.exchange import HostExchange
+from acu_daemon.protocol.messages import AcuMode, Command, Faults, Identify, Identity, Poll, ReadFaults, Reply, Status
+from acu_daemon.protocol.sa3842 import address_byte
+from acu_daemon.units import DAY_S
+
+REPLY_S = 0.5
+HEALTHY_AGE_S = 5.0
+GO, WARN, NO_GO = "GO", "WARN", "NO-GO"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One line of the check."""
+
+    verdict: str
+    what: str
+    detail: str
+
+
+def command(
+    config: Config,
+    satellite: Annotated[
+        str | None, typer.Option("--satellite", help="Also this satellite's elements and next pass.  Default: all.")
+    ] = None,
+    running: Annotated[
+        bool, typer.Option("--running", help="Only look whether the daemon that runs here ticks (for health checks).")
+    ] = False,
+    state: Annotated[Path | None, typer.Option("--state", metavar="DIR", help="The running daemon's --state.")] = None,
+) -> None:
+    """Check everything a pass needs: files, clock, elements, next pass, cable wrap, link, ACU.  Moves nothing.
+
+    A line per check, GO, WARN or NO-GO; exit status 1 if any is NO-GO.
+    """
+    worst = GO
+    for finding in [_running(state)] if running else _findings(config, satellite):
+        typer.echo(f"{finding.verdict:6} {finding.what:22} {finding.detail}")
+        if finding.verdict == NO_GO or (finding.verdict == WARN and worst == GO):
+            worst = finding.verdict
+    typer.echo(f"{worst}: " + {GO: "ready", WARN: "ready, with warnings", NO_GO: "not ready"}[worst])
+    if worst == NO_GO:
+        raise typer.Exit(1)
+
+
+def _findings(config: Path, satellite: str | None) -> Iterator[Finding]:
+    try:
+        station = load_station(config)
+    except UsageError as error:
+        yield Finding(NO_GO, "station.toml", str(error))
+        return
+    yield Finding(GO, "station.toml", f"{station.station.name}, ACU at {station.acu.url}")
+    if station.safety.arm == "manual":
+        yield Finding(WARN, "arming", '[safety] arm = "manual": the daemon writes nothing until a person arms it')
+    yield _clock()
+    names = [satellite] if satellite else satellite_names(config)
+    if not names:
+        yield Finding(NO_GO, "satellites", f"{config}/satellites holds no satellite; put a NAME.toml there")
+    for name in names:
+        yield from _satellite(config, name)
+    try:
+        link = make_link(station.acu.url)
+        check_rate(link, station.acu.period_s, station.acu.device_delay_s)
+        yield Finding(GO, "line rate", f"{link.description} carries {1 / station.acu.period_s:g} writes a second")
+    except UsageError as error:
+        yield Finding(NO_GO, "line rate", str(error))
+        return
+    yield from asyncio.run(_acu(station.acu.url, address_byte(station.acu.address)))
+
+
+def _running(state: Path | None) -> Finding:
+    path = state_directory(state, is_rehearsal=False) / SNAPSHOT
+    try:
+        age_s = time.time() - path.stat().st_mtime
+    except OSError:
+        return Finding(NO_GO, "running daemon", f"{path}: no daemon has written it")
+    verdict = GO if age_s < HEALTHY_AGE_S else NO_GO
+    return Finding(verdict, "running daemon", f"{path}: written {age_s:.1f} s ago")
+
+
+def _clock() -> Finding:
+    if is_clock_synchronised():
+        return Finding(GO, "clock", "the kernel reports a synchronised clock")
+    return Finding(WARN, "clock", "not synchronised; start chrony or ntpd: 0.1 s is up to 0.1 deg on a low orbit")
+
+
+def _satellite(config: Path, name: str) -> Iterator[Finding]:
+    now_tai_s = SystemClock().tai_s()
+    try:
+        target = load_target(config, name, now_tai_s, is_strict=False)
+    except AcuDaemonError as error:
+        yield Finding(NO_GO, f"{name}: files", str(error))
+        return
+    elements = target.elements
+    age = f"epoch {utc_text(elements.epoch_tai_s, 0)}, {(now_tai_s - elements.epoch_tai_s) / DAY_S:.1f} days old"
+    if elements.errors:
+        yield Finding(NO_GO, f"{name}: elements", "; ".join(elements.errors))
+        return
+    yield Finding(WARN if elements.warnings else GO, f"{name}: elements", "; ".join([*elements.warnings, age]))
+    yield from _next_pass(name, target, now_tai_s)
+
+
+def _next_pass(name: str, target: Target, now_tai_s: float) -> Iterator[Finding]:
+    station = target.station
+    lowest_deg = station.station.min_elevation_deg
+    passes = find_passes(target.elements.propagator, station.site, now_tai_s, now_tai_s + DAY_S, lowest_deg)
+    if not passes:
+        yield Finding(WARN, f"{name}: next pass", f"none above {lowest_deg:g} deg within a day")
+        return
+    coming = passes[0]
+    yield Finding(
+        GO,
+        f"{name}: next pass",
+        f"{utc_text(coming.rise_tai_s, 0)}, {coming.duration_s / 60:.1f} min, up to "
+        f"{coming.culmination_el_deg:.1f} deg",
+    )
+    limits = station.acu.azimuth.limits()
+    middle_deg = (limits.min_deg + limits.max_deg) / 2
+    plan = plan_pass(target.elements.propagator, station.site, coming, middle_deg, limits, coming.rise_tai_s)
+    if plan.note:
+        yield Finding(WARN, f"{name}: cable wrap", plan.note)
+    else:
+        yield Finding(GO, f"{name}: cable wrap", f"the pass is held from azimuth {plan.start_az_deg:.1f} deg on")
+
+
+async def _acu(url: str, address: int) -> list[Finding]:
+    """Ask identity, status and faults: nothing that moves or changes the ACU."""
+    link = make_link(url)
+    exchange = HostExchange(address)
+
+    async def ask(request: Command) -> Reply | None:
+        link.write(exchange.begin(request))
+        try:
+            async with asyncio.timeout(REPLY_S):
+                while True:
+                    data, _ = await link.read()
+                    reply = exchange.receive(data)
+                    if reply is not None:
+                        return reply
+        except TimeoutError:
+            exchange.fail()
+            return None
+
+    try:
+        await link.open()
+        status = await ask(Poll())
+        if not isinstance(status, Status):
+            why = f"{link.description} is open, but no ACU answers: check address and baud rate"
+            return [Finding(NO_GO, "ACU", why)]
+        identity, faults = await ask(Identify()), await ask(ReadFaults())
+    except LinkError as error:
+        return [Finding(NO_GO, "ACU", str(error))]
+    finally:
+        await link.close()
+    return list(_acu_findings(status, identity, faults))
+
+
+def _acu_findings(status: Status, identity: Reply | None, faults: Reply | None) -> Iterator[Finding]:
+    who = str(identity) if isinstance(identity, Identity) else "does not identify itself"
+    yield Finding(
+        GO,
+        "ACU",
+        f"{who}, {status.mode.name}, az {status.az_deg:.2f} el {status.el_deg:.2f}, AGC {status.agc_db:.1f} dB",
+    )
+    if status.mode is AcuMode.MANUAL or not status.is_remote_enabled:
+        yield Finding(NO_GO, "ACU control", "the local panel has control: switch the ACU to REMOTE")
+    else:
+        yield Finding(GO, "ACU control", "remote control is enabled")
+    named = ", ".join(faults.texts()) if isinstance(faults, Faults) else ""
+    if status.mode is AcuMode.FAULT or named:
+        yield Finding(NO_GO, "ACU faults", named or "mode FAULT")
+    else:
+        yield Finding(GO, "ACU faults", "none")
+    if not status.is_receiver_valid:
+        yield Finding(WARN, "receiver", "the ACU calls its receiver not valid: no AGC, or no demodulator")
+    if status.mode in (AcuMode.STOWED, AcuMode.STOWING):
+        yield Finding(WARN, "stow", f"{status.mode.name}: the daemon leaves it when the pass is near")

@@ -1,0 +1,160 @@
+"""`acu-daemon run`: the daemon, in the foreground of its terminal."""
+
+import asyncio
+import contextlib
+import gc
+import math
+import signal
+import sys
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import structlog
+import typer
+
+from acu_daemon.cli.options import At, AtMonotonic, Config, Satellite, Target, coming_pass, load_target, make_clock
+from acu_daemon.config import control_config, estimator_settings
+from acu_daemon.control.refit import RefitSetup
+from acu_daemon.daemon.area import Snapshot
+from acu_daemon.daemon.live import LiveLine
+from acu_daemon.daemon.service import Outcome, PassJob, Service
+from acu_daemon.edge.clock import SystemClock
+from acu_daemon.edge.fit import ProcessFitRunner
+from acu_daemon.edge.link import Link, check_rate, make_link
+from acu_daemon.edge.logs import configure_logs
+from acu_daemon.edge.recording import RecordingWriter
+from acu_daemon.edge.state import SnapshotFile, state_directory
+from acu_daemon.model import Pass
+from acu_daemon.orbit.timescales import utc_text
+from acu_daemon.protocol.sa3842 import address_byte
+
+PROCESS_START_S = time.monotonic()
+
+
+def command(
+    config: Config,
+    satellite: Satellite,
+    at: At = None,
+    at_monotonic: AtMonotonic = None,
+    duration: Annotated[
+        float | None, typer.Option("--duration", metavar="S", help="End after this many seconds, if not before.")
+    ] = None,
+    record: Annotated[
+        Path | None,
+        typer.Option("--record", metavar="FILE", help="Write the readings as CSV; `acu-daemon replay` reads it."),
+    ] = None,
+    state: Annotated[
+        Path | None,
+        typer.Option(
+            "--state", metavar="DIR", help="Where state is kept.  Default: $STATE_DIRECTORY, else the XDG state home."
+        ),
+    ] = None,
+) -> None:
+    """Track a satellite: the pass in progress, else the next one.
+
+    Polls the ACU, writes its registers ten times a second, fits the orbit while the signal is locked and steers by the
+    prediction while it is not.  Ends after the pass, after --duration, on SIGTERM or Ctrl-C, with a safe stop.
+
+    Exit status: 0 done; 1 the satellite was never acquired; 2 wrong use or configuration; 3 no ACU within 10 s.
+    """
+    clock = make_clock(at, at_monotonic)
+    target = load_target(config, satellite, clock.tai_s())
+    coming = coming_pass(target, clock.tai_s())
+    link = make_link(target.station.acu.url)
+    check_rate(link, target.station.acu.period_s, target.station.acu.device_delay_s)
+    snapshots = SnapshotFile(state_directory(state, is_rehearsal=clock.is_rehearsal))
+    live = LiveLine() if sys.stderr.isatty() else None
+    configure_logs(
+        clock.tai_s,
+        tags={"REHEARSAL": True} if clock.is_rehearsal else {},
+        is_terminal=sys.stdout.isatty(),
+        before_line=live.clear if live else None,
+    )
+    end_tai_s = math.inf if duration is None else clock.tai_s() + duration - (time.monotonic() - PROCESS_START_S)
+    _announce(target, coming, clock)
+    job = make_job(target, coming, link, is_rehearsal=clock.is_rehearsal, end_tai_s=end_tai_s)
+    with RecordingWriter(record) if record is not None else contextlib.nullcontext() as recording:
+        outcome = asyncio.run(_run(job, link, clock, live, recording, snapshots))
+    structlog.get_logger("run").info("run.done", **asdict(outcome))
+    if outcome.has_begun and not outcome.has_acquired and outcome.reason != "SIGTERM":
+        raise typer.Exit(1)
+
+
+def make_job(target: Target, coming: Pass, link: Link, *, is_rehearsal: bool, end_tai_s: float = math.inf) -> PassJob:
+    """What the files say, as the daemon needs it."""
+    station = target.station
+    return PassJob(
+        refit=RefitSetup(
+            target.elements.propagator,
+            station.site,
+            station.tracking.estimator,
+            estimator_settings(station),
+            station.acu.azimuth.limits(),
+        ),
+        control=control_config(station, target.satellite, link.byte_time_s),
+        coming=coming,
+        horizon_s=station.tracking.horizon_s,
+        low_water_s=station.tracking.low_water_s,
+        address=address_byte(station.acu.address),
+        device_delay_s=station.acu.device_delay_s,
+        is_rehearsal=is_rehearsal,
+        end_tai_s=end_tai_s,
+    )
+
+
+def _announce(target: Target, coming: Pass, clock: SystemClock) -> None:
+    log: Any = structlog.get_logger("run")
+    tracking = target.station.tracking
+    log.info(
+        "run.start",
+        satellite=target.elements.label,
+        station=target.station.station.name,
+        acu=target.station.acu.url,
+        elements=target.elements.propagator.kind,
+        elements_age_days=round((clock.tai_s() - target.elements.epoch_tai_s) / 86400.0, 2),
+        rise=utc_text(coming.rise_tai_s, 0),
+        set=utc_text(coming.set_tai_s, 0),
+        culmination_deg=round(coming.culmination_el_deg, 1),
+    )
+    for warning in target.elements.warnings:
+        log.warning("elements.warning", reason=warning)
+    if tracking.estimator == "full":
+        log.info("estimator.stand_in", asked="full", runs="kalman", reason="`full` does not exist yet")
+    if target.station.safety.arm == "manual":
+        log.warning("run.disarmed", reason='[safety] arm = "manual": nothing is written to the ACU')
+
+
+async def _run(
+    job: PassJob,
+    link: Link,
+    clock: SystemClock,
+    live: LiveLine | None,
+    recording: RecordingWriter | None,
+    snapshots: SnapshotFile,
+) -> Outcome:
+    def show(seen: Snapshot) -> None:
+        snapshots.write(asdict(seen))
+        if live is not None:
+            live.show(seen)
+
+    service = Service(
+        job,
+        link,
+        clock,
+        ProcessFitRunner(job.refit),
+        on_snapshot=show,
+        on_reading=recording.add if recording else None,
+    )
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, service.stop, "SIGTERM")
+    gc.collect()
+    gc.freeze()  # a full collection over the start-up heap would stall a tick by tens of milliseconds
+    try:
+        return await service.run()
+    finally:
+        if live is not None:
+            live.clear()
+        clock.close()

@@ -1,0 +1,48 @@
+"""Where state lives (design section 8): --state, else $STATE_DIRECTORY, else acu-daemon in the XDG state home."""
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from acu_daemon.errors import UsageError
+
+
+def state_directory(asked: Path | None, *, is_rehearsal: bool) -> Path:
+    """Make and return the directory; a rehearsal has one of its own beside the real one.  UsageError: it cannot."""
+    if asked is not None:
+        real = asked
+    elif os.environ.get("STATE_DIRECTORY"):
+        real = Path(os.environ["STATE_DIRECTORY"].split(":")[0])
+    else:
+        real = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state") / "acu-daemon"
+    directory = real.with_name(real.name + "-rehearsal") if is_rehearsal else real
+    try:
+        directory.mkdir(mode=0o750, parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"state directory {directory}: {error.strerror}; choose another with --state DIR") from None
+    return directory
+
+
+SNAPSHOT = "snapshot.json"
+EVERY_TICKS = 10
+
+
+class SnapshotFile:
+    """The daemon's present view, once a second, for health checks and scripts.  A failed write never stops a tick."""
+
+    def __init__(self, directory: Path) -> None:
+        self._path = directory / SNAPSHOT
+        self._unfinished = directory / f".{SNAPSHOT}.{os.getpid()}"
+        self._skip = 0
+        self.failed_count = 0
+
+    def write(self, values: dict[str, Any]) -> None:
+        self._skip = (self._skip + 1) % EVERY_TICKS
+        if self._skip:
+            return
+        try:
+            self._unfinished.write_text(json.dumps(values), encoding="utf-8")
+            self._unfinished.replace(self._path)
+        except OSError:
+            self.failed_count += 1
