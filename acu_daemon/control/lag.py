@@ -2,8 +2,8 @@
 
 Commands stand still between hand-overs, so the servo chases a staircase.  A servo with lag T (first order) that is
 given steps s every period h shows, at the moment phi after a step took effect, an angle g * s short of the newest step,
-where g = exp(-phi/T) / (1 - exp(-h/T)).  g is learned by least squares over the readings of the pass and turned back into T,
-which the aim of the commands then leads (ICD section 6; field lesson: "the antenna always lags").
+where g = exp(-phi/T) / (1 - exp(-h/T)).  g is learned by least squares over the readings of the pass and turned
+back into T, which the aim of the commands then leads (ICD section 6; field lesson: "the antenna always lags").
 """
 
 from dataclasses import dataclass, replace

@@ -55,7 +55,7 @@ class Background:
                 await self._refit()
 
     def _is_due(self) -> bool:
-        """At once without a buffer or after a change of state that needs one; each second while locked; at low water."""
+        """At once without a buffer and on a loss; each second while locked; at low water."""
         area, now_tai_s = self._area, self._clock.tai_s()
         before, self._seen = self._seen, area.state.track
         plan = area.sky.plan
@@ -97,7 +97,7 @@ class Background:
         )
 
     def _near_az_deg(self, tai_s: float) -> float:
-        """The turn on which the path continues: of the antenna while acquired, else of the last buffer, else of the plan."""
+        """The turn on which the path continues: the last buffer's, but the antenna's while it tracks by itself."""
         state, sky = self._area.state, self._area.sky
         if sky.plan is not None and tai_s < sky.plan.start_tai_s:
             return sky.plan.start_az_deg

@@ -1,7 +1,6 @@
 """One exchange after another with the ACU, and the connection kept alive beside them (ICD sections 1 and 6)."""
 
 import asyncio
-import contextlib
 from collections import deque
 from dataclasses import dataclass
 from typing import Any
@@ -24,7 +23,7 @@ LONGEST_EXTRA = 18  # bytes of the longest housekeeping exchange that goes besid
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What one exchange brought: the reply, or None at the deadline; and when its write started and its reply arrived."""
+    """What one exchange brought: the reply, or None at the deadline; when its write started, when the reply did."""
 
     reply: Reply | None
     started_tai_s: float
@@ -155,6 +154,7 @@ class AcuPort:
                 return
         raise LinkError(self.problem or f"{self._link.description} is open, but no ACU answers a poll")
 
-    async def close(self) -> None:
-        with contextlib.suppress(LinkError):
-            await self._link.close()
+    def abandon(self) -> None:
+        """Give up an exchange whose waiter was cancelled, so that the next one starts clean."""
+        if self._exchange.is_outstanding:
+            self._exchange.fail()
