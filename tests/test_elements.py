@@ -1,0 +1,162 @@
+"""Which set of a list is used, and which sets are refused or warned of: limits, age, decay."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acu_daemon.errors import ElementsError
+from acu_daemon.orbit.brouwer import BrouwerElements
+from acu_daemon.orbit.element_set import rad_s_from_rev_day
+from acu_daemon.orbit.elements import ElementLimits, ElementSet, check_brouwer, check_elements, select_elements
+from acu_daemon.orbit.tle import parse_tle
+from acu_daemon.units import DAY_S
+
+TEXT = """ISS (ZARYA)
+1 25544U 98067A   22041.55493323  .00006763  00000-0  12771-3 0  9996
+2 25544  51.6412 243.7057 0005670 116.5714 333.9560 15.49692082325546
+"""
+SUBORBITAL = """1 28872U 05037B   05333.02012661  .25992681  00000-0  24476-3 0  1534
+2 28872  96.4736 157.9986 0303955 244.0492 110.6523 16.46015938 10708
+"""
+LAST_DAYS = """1 29141U 85108AA  06170.26783845  .99999999  00000-0  13519-0 0   718
+2 29141  82.4288 273.4882 0015848 277.2124  83.9133 15.93343074  6828
+"""
+ISS: ElementSet = parse_tle(TEXT, "iss.tle")[0][0]
+NOW = ISS.epoch_tai_s
+LIMITS = ElementLimits()
+
+
+def aged(days: float) -> float:
+    return NOW + days * DAY_S
+
+
+def test_a_fresh_low_orbit_is_neither_refused_nor_warned_of() -> None:
+    assert check_elements(ISS, LIMITS, aged(3.0)) == ([], [])
+
+
+def test_an_epoch_60_days_old_is_refused_with_file_line_and_reason() -> None:
+    [error], [] = check_elements(ISS, LIMITS, aged(60.0))
+    assert error == (
+        "iss.tle, line 2: ISS (ZARYA) (25544): the epoch 2022-02-10T13:19:06Z is 60.0 days old, the limit is 30 days; "
+        "fetch newer elements"
+    )
+
+
+def test_an_epoch_of_the_future_is_refused_too() -> None:
+    [error], [] = check_elements(ISS, LIMITS, aged(-60.0))
+    assert "is 60.0 days ahead of the clock, the limit is 30 days" in error
+
+
+def test_an_epoch_12_days_old_is_warned_of() -> None:
+    [], [warning] = check_elements(ISS, LIMITS, aged(12.0))
+    assert warning.startswith("iss.tle, line 2: ISS (ZARYA) (25544): the epoch 2022-02-10T13:19:06Z is 12.0 days old")
+
+
+def test_the_age_limits_are_those_of_the_satellite() -> None:
+    limits = replace(LIMITS, warn_age_days=70.0, max_age_days=90.0)
+    assert check_elements(ISS, limits, aged(60.0)) == ([], [])
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"mean_motion_rad_s": rad_s_from_rev_day(1.0027)}, "semi-major axis 42165.24 km is outside 6500..8500 km"),
+        ({"mean_motion_rad_s": rad_s_from_rev_day(13.0), "eccentricity": 0.12}, "eccentricity 0.12 is outside 0..0.1"),
+    ],
+)
+def test_an_element_outside_the_limits_is_refused_with_what_was_expected(
+    changes: dict[str, float], reason: str
+) -> None:
+    errors, _ = check_elements(replace(ISS, **changes), LIMITS, NOW)
+    assert errors[0].startswith(f"iss.tle, line 2: ISS (ZARYA) (25544): {reason}")
+    assert "widen [elements.limits]" in errors[0]
+
+
+def test_limits_may_be_narrower_or_wider() -> None:
+    [error], [] = check_elements(ISS, replace(LIMITS, max_inclination_deg=51.0), NOW)
+    assert "inclination 51.6412 deg is outside 0..51 deg" in error
+    assert check_elements(ISS, replace(LIMITS, max_inclination_deg=51.6412), NOW) == ([], [])
+
+
+def test_a_perigee_inside_the_atmosphere_is_a_decayed_satellite() -> None:
+    [one], [] = parse_tle(SUBORBITAL, "deb.tle")
+    errors, _ = check_elements(one, LIMITS, one.epoch_tai_s)
+    assert "deb.tle, line 1: NORAD 28872: mean perigee at " in errors[0]
+    assert "the satellite has decayed, or the elements are wrong" in errors[0]
+
+
+def test_a_satellite_that_decays_before_now_is_refused() -> None:
+    [one], [] = parse_tle(LAST_DAYS, "deb.tle")
+    assert check_elements(one, LIMITS, one.epoch_tai_s) == ([], [])
+    [error], [] = check_elements(one, LIMITS, one.epoch_tai_s + DAY_S / 2)
+    assert error.startswith("deb.tle, line 1: NORAD 29141: no position at 2006-06-19T")
+    assert "the satellite has decayed (SGP4 error 6)" in error
+
+
+def test_elements_written_in_a_file_are_checked_alike() -> None:
+    scd_1 = BrouwerElements("SCD-1", NOW, 7180e3, 0.0436, float(np.radians(23.82)), 4.19, 0.27, 6.1)
+    assert check_brouwer(scd_1, LIMITS, NOW, "scd-1.toml") == ([], [])
+    errors, _ = check_brouwer(replace(scd_1, e=0.2), LIMITS, aged(40.0), "scd-1.toml")
+    assert [error.split(";")[0] for error in errors] == [
+        "scd-1.toml: SCD-1: eccentricity 0.2 is outside 0..0.1",
+        "scd-1.toml: SCD-1: mean perigee at -634 km height, under 120 km: the satellite has decayed, "
+        "or the elements are wrong",
+        "scd-1.toml: SCD-1: the epoch 2022-02-10T13:19:06Z is 40.0 days old, the limit is 30 days",
+    ]
+
+
+HISTORY = [replace(ISS, epoch_tai_s=aged(days), line=line) for line, days in enumerate((-2.0, 0.0, -1.0, 2.0))]
+OTHER = replace(ISS, name="SENTINEL-3A", norad_id=41335)
+
+
+def test_the_newest_set_not_after_now_is_chosen() -> None:
+    assert select_elements(HISTORY, 25544, None, aged(1.0)) == (HISTORY[1], [])
+
+
+def test_before_every_epoch_the_oldest_set_is_chosen_with_a_warning() -> None:
+    one, [warning] = select_elements(HISTORY, None, None, aged(-5.0))
+    assert one is HISTORY[0]
+    assert "every epoch is ahead of the clock, the oldest (2022-02-08T13:19:06Z) is used" in warning
+
+
+def test_a_file_with_one_satellite_needs_neither_number_nor_name() -> None:
+    assert select_elements([ISS], None, None, NOW)[0] is ISS
+    assert select_elements([ISS], None, "my own name", NOW)[0] is ISS
+
+
+@pytest.mark.parametrize("name", ["SENTINEL-3A", "sentinel 3a", "Sentinel3A"])
+def test_a_list_is_searched_by_number_else_by_name(name: str) -> None:
+    assert select_elements([ISS, OTHER], None, name, NOW)[0] is OTHER
+    assert select_elements([ISS, OTHER], 25544, name, NOW)[0] is ISS
+
+
+@pytest.mark.parametrize(
+    ("norad_id", "name", "message"),
+    [
+        (7, None, r"iss.tle: no element set with norad_id 7; the file holds ISS \(ZARYA\) \(25544\), SENTINEL-3A"),
+        (None, "SCD-1", r"iss.tle: no element set with name 'SCD-1'; the file holds"),
+        (None, None, r"iss.tle: the file holds .*; say which by norad_id"),
+    ],
+)
+def test_a_satellite_that_is_not_in_the_list_is_an_error_that_says_what_is(
+    norad_id: int | None, name: str | None, message: str
+) -> None:
+    with pytest.raises(ElementsError, match=message):
+        select_elements([ISS, OTHER], norad_id, name, NOW)
+
+
+def test_a_long_list_is_named_by_its_first_few() -> None:
+    many = [replace(ISS, norad_id=number) for number in range(1, 21)]
+    with pytest.raises(ElementsError, match=r"\(5\) and 15 more$"):
+        select_elements(many, 99, None, NOW)
+
+
+def test_a_name_that_two_satellites_bear_is_an_error() -> None:
+    with pytest.raises(ElementsError, match=r"'DEB' fits the satellites \[1, 2\]; say which by norad_id"):
+        select_elements([replace(ISS, name="DEB", norad_id=number) for number in (1, 2)], None, "DEB", NOW)
+
+
+def test_an_empty_list_is_an_error() -> None:
+    with pytest.raises(ElementsError, match="no usable element set"):
+        select_elements([], 1, None, NOW)

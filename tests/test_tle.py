@@ -1,0 +1,154 @@
+"""Two-line element sets: what is read, and what is refused with file, line and reason."""
+
+import gzip
+from math import degrees
+
+import pytest
+from conftest import DATA, needs_data
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acu_daemon.orbit.element_set import ElementSet, Problem
+from acu_daemon.orbit.timescales import utc_text
+from acu_daemon.orbit.tle import catalogue_number, parse_tle
+
+NAME = "ISS (ZARYA)"
+ONE = "1 25544U 98067A   22041.55493323  .00006763  00000-0  12771-3 0  9996"
+TWO = "2 25544  51.6412 243.7057 0005670 116.5714 333.9560 15.49692082325546"
+OTHER_ONE = "1 41335U 16011A   18357.18506581  .00000016  00000-0  24644-4 0  9994"
+OTHER_TWO = "2 41335  98.6325  61.6775 0000955  88.1804 271.9486 14.26733655148351"
+
+
+def parse(*lines: str, end: str = "\n") -> tuple[list[ElementSet], list[Problem]]:
+    return parse_tle(end.join(lines) + end, "sats.tle")
+
+
+def edited(line: str, first: int, text: str) -> str:
+    """The line with other text from a column on, its checksum made right."""
+    body = (line[: first - 1] + text + line[first - 1 + len(text) :])[:68]
+    return body + str(sum(int(c) if c.isdigit() else c == "-" for c in body) % 10)
+
+
+def only_problem(*lines: str) -> str:
+    sets, problems = parse(*lines)
+    assert not sets
+    assert len(problems) == 1
+    return str(problems[0])
+
+
+def test_every_field_of_a_set_is_read() -> None:
+    [one], [] = parse(NAME, ONE, TWO)
+    assert (one.kind, one.name, one.norad_id, one.file, one.line) == ("tle", NAME, 25544, "sats.tle", 2)
+    assert utc_text(one.epoch_tai_s, 5) == "2022-02-10T13:19:06.23107Z"
+    angles = (one.inclination_rad, one.raan_rad, one.argp_rad, one.mean_anomaly_rad)
+    assert [degrees(angle) for angle in angles] == pytest.approx([51.6412, 243.7057, 116.5714, 333.9560])
+    assert one.eccentricity == pytest.approx(0.0005670)
+    assert one.bstar_per_radius == pytest.approx(0.12771e-3)
+    assert one.mean_motion_rad_s == pytest.approx(15.49692082 * 2 * 3.141592653589793 / 86400)
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("name", [(), (NAME,), (f"0 {NAME}",), (f"{NAME}             ",), ("", "# comment", NAME)])
+def test_any_line_ends_and_any_form_of_the_name_are_read(end: str, name: tuple[str, ...]) -> None:
+    [first, second], [] = parse(*name, ONE, TWO, "", *name, OTHER_ONE, OTHER_TWO, end=end)
+    assert (first.norad_id, second.norad_id) == (25544, 41335)
+    assert first.name == second.name == (NAME if name else "")
+    assert first.line == len(name) + 1
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ((ONE[:-1] + "5", TWO), "line 1: checksum 5, computed 6: the line was changed"),
+        ((ONE, TWO.replace("243.7057", "243.7058")), "line 2: checksum 6, computed 7: the line was changed"),
+        ((TWO, ONE), "line 1: the two lines are swapped: line 2 stands before line 1"),
+        ((ONE, OTHER_TWO), "line 2: catalogue number 41335 does not match 25544 of line 1"),
+        ((ONE[:60], TWO), "line 1: 60 characters, an element line has 69"),
+        ((ONE, TWO + " 0.0 1440.0"), "line 2: 80 characters, an element line has 69"),
+        ((ONE,), "line 1: line 1 of an element set without the other line"),
+        ((TWO,), "line 1: line 2 of an element set without the other line"),
+        (("No GP data found",), "line 1: 'No GP data found' is neither an element line nor the name of a set below it"),
+        ((ONE, edited(TWO, 9, " 5x.6412")), "line 2: inclination (columns 9-16) is '5x.6412', not a number"),
+        ((ONE, edited(TWO, 9, "190.6412")), "line 2: inclination 190.6412 deg; it must lie in 0..180"),
+        ((ONE, edited(TWO, 27, " 00567 ")), "line 2: eccentricity (columns 27-33) is ' 00567 ', not 7 digits"),
+        ((ONE, edited(TWO, 53, "        nan")), "line 2: mean motion (columns 53-63) is 'nan', not a number"),
+        ((ONE, edited(TWO, 53, " 0.00000000")), "line 2: mean motion 0.0 revolutions a day; it must be positive"),
+        ((ONE, edited(TWO, 17, "2")), "line 2: column 17 must be blank: the numbers are not in their columns"),
+        ((edited(ONE, 54, " 1277x-3"), TWO), "line 1: B* (columns 54-61) is '1277x-3', not like 12345-3"),
+        ((edited(ONE, 19, "22366.50000000"), TWO), "line 1: epoch day 366.5 is no day of 2022"),
+        ((edited(ONE, 63, "4"), TWO), "line 1: ephemeris type 4 (SGP4-XP) needs a propagator of its own"),
+        ((edited(ONE, 3, "I5544"), edited(TWO, 3, "I5544")), "line 1: catalogue number 'I5544': five digits, or"),
+        ((ONE.replace(" ", "\x00", 1), TWO), "line 1: '1\\x0025544U"),
+    ],
+)
+def test_a_bad_set_is_refused_with_file_line_and_reason(lines: tuple[str, ...], message: str) -> None:
+    sets, problems = parse(*lines)
+    assert not sets
+    assert str(problems[0]).startswith(f"sats.tle, {message}")
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        *((NAME, TWO, ONE), (NAME, ONE), (NAME, TWO), (ONE[:-1] + "5", TWO), (ONE, TWO[:30]), (NAME,), (TWO, TWO)),
+        *((ONE, OTHER_TWO), ("<html>", "", "<body>")),
+    ],
+)
+def test_a_bad_set_in_a_list_loses_none_of_the_good_ones(bad: tuple[str, ...]) -> None:
+    sets, problems = parse("SENTINEL-3A", OTHER_ONE, OTHER_TWO, *bad, "SENTINEL-3A", OTHER_ONE, OTHER_TWO)
+    assert [(one.name, one.norad_id) for one in sets] == [("SENTINEL-3A", 41335)] * 2
+    assert problems
+    assert all(problem.line is not None and 4 <= problem.line < 4 + len(bad) for problem in problems)
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [
+        *(("5", 5), ("00005", 5), ("A0000", 100000), ("H9999", 179999), ("J0001", 180001), ("Z9999", 339999)),
+        *(("799500001", 799500001), ("I0000", None), ("O0000", None), ("a0000", None), ("A00001", None), ("", None)),
+        *(("-5", None), ("²²²²²", None), ("1234567890", None)),
+    ],
+)
+def test_catalogue_numbers_may_be_alpha_5_or_long(text: str, number: int | None) -> None:
+    assert catalogue_number(text) == number
+
+
+def test_an_alpha_5_set_is_read() -> None:
+    [one], [] = parse(edited(ONE, 3, "T0001"), edited(TWO, 3, "T0001"))
+    assert one.norad_id == 270001
+
+
+def test_an_epoch_of_57_is_1957_and_of_56_is_2056() -> None:
+    [old, new], [] = parse(edited(ONE, 19, "57"), TWO, edited(ONE, 19, "56"), TWO)
+    assert utc_text(old.epoch_tai_s)[:4] == "1957"
+    assert utc_text(new.epoch_tai_s)[:4] == "2056"
+
+
+@needs_data
+def test_every_real_list_is_read_without_a_problem() -> None:
+    texts = {path.name: path.read_bytes().decode() for path in (DATA / "tle_sets").glob("*.txt")}
+    packed = next((DATA / "tle_sets").glob("*.gz"))
+    texts[packed.name] = gzip.decompress(packed.read_bytes()).decode()
+    for file, text in texts.items():
+        sets, problems = parse_tle(text, file)
+        assert not problems
+        assert len(sets) == text.count("\n1 ")
+        assert all(one.name for one in sets)
+
+
+@given(st.text())
+def test_no_text_makes_the_parser_fail(text: str) -> None:
+    sets, _ = parse_tle(text, "x")
+    assert not sets
+
+
+@given(st.data())
+def test_no_damage_to_a_set_makes_the_parser_fail(data: st.DataObject) -> None:
+    text = list(f"{NAME}\n{ONE}\n{TWO}\n")
+    for _ in range(data.draw(st.integers(1, 4))):
+        text[data.draw(st.integers(0, len(text) - 1))] = data.draw(st.characters() | st.sampled_from(" \r\n-+.012é²"))
+    lines = "".join(text).split("\n")
+    fixed = [edited(line, 1, "") if len(line) == 69 else line for line in lines if line.isascii()]
+    for candidate in ("".join(text), "\n".join(fixed)):
+        sets, problems = parse_tle(candidate, "x")
+        assert sets or problems
