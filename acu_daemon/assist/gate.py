@@ -1,7 +1,10 @@
 """Which readings are fit to be used: the dwell after acquisition, and plain reasons to leave a reading out.  Pure."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from math import cos, hypot, radians
+from math import cos, radians, sqrt
+
+import numpy as np
 
 from acu_daemon.model import AxisLimits, Reading, Readings
 from acu_daemon.units import wrap_180
@@ -46,6 +49,13 @@ class Dwell:
         return reading.tai_s - since >= self._dwell_s - 1e-6
 
 
+def locked_readings(readings: Iterable[Reading], dwell: Dwell) -> Readings:
+    """Keep the locked ones, oldest first, in the form that estimators take."""
+    rows = [(r.tai_s, r.az_deg, r.el_deg) for r in readings if dwell.is_locked(r)]
+    tai_s, az_deg, el_deg = np.array(rows, dtype=np.float64).reshape(-1, 3).T
+    return Readings(tai_s, az_deg, el_deg)
+
+
 class ReadingGate:
     """Leaves out what no fit should see, before any orbit is involved.  Mutable; one owner.
 
@@ -66,7 +76,7 @@ class ReadingGate:
         self._last: tuple[float, float, float] | None = None
 
     def split(self, readings: Readings) -> tuple[Readings, list[Rejected]]:
-        """Part the readings into those to use and those left out, oldest first."""
+        """Part readings into those to use and those left out, oldest first."""
         keep: list[int] = []
         rejected: list[Rejected] = []
         rows = zip(readings.tai_s.tolist(), readings.az_deg.tolist(), readings.el_deg.tolist(), strict=True)
@@ -86,7 +96,7 @@ class ReadingGate:
             return False
         dt_s = tai_s - self._last[0]
         cos_el = max(cos(radians(max(el_deg, self._last[2]))), 1e-3)
-        noise_deg = _SIGMA_COUNT * hypot(self._sigma_deg[0], self._sigma_deg[0]) / cos_el
-        far_az = self._azimuth.max_rate_deg_s * _RATE_MARGIN * dt_s + noise_deg
-        far_el = self._elevation.max_rate_deg_s * _RATE_MARGIN * dt_s + _SIGMA_COUNT * hypot(*(self._sigma_deg[1],) * 2)
+        noise_az, noise_el = (_SIGMA_COUNT * sqrt(2.0) * sigma_deg for sigma_deg in self._sigma_deg)
+        far_az = self._azimuth.max_rate_deg_s * _RATE_MARGIN * dt_s + noise_az / cos_el
+        far_el = self._elevation.max_rate_deg_s * _RATE_MARGIN * dt_s + noise_el
         return abs(wrap_180(az_deg - self._last[1])) > far_az or abs(el_deg - self._last[2]) > far_el

@@ -89,6 +89,7 @@ def _once(
     """One pass through eqs 4-16: raan, mean anomaly, the radius they give, and sin(lambda_o)."""
     b = cosines @ station_m  # eq 5
     slant = np.sqrt(radius**2 - station_m @ station_m + b**2) - b  # eq 4
+    slant = np.where(slant > 0.0, slant, np.nan)  # else the sphere lies behind
     x, y, z = (station_m + slant[:, None] * cosines).T  # eq 6
     tan_lat = z / np.hypot(x, y)  # eq 7
     sin_i = np.sin(known.i_rad)

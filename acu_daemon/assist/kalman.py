@@ -7,7 +7,8 @@ batch is taken in, the batch is taken again, linearised at the new state.
 """
 
 from dataclasses import dataclass
-from math import cos, pi, radians, sqrt
+from math import pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,26 +23,33 @@ from acu_daemon.units import DEG, Array
 _BATCH_COUNT = 50
 _MAX_SWEEPS = 8
 _MOVED_RAD = 3e-5  # a smaller move of the state leaves less than 1e-5 deg of curvature
+_LEAST_COS_EL = 1e-3
 _OUTLIER_SIGMAS = 6.0
 _RESET_AFTER_COUNT = 20  # so many outliers in a row mean that the filter is wrong, not the readings
 
 
-@dataclass(frozen=True, slots=True)
-class FilterState:
-    """Estimate and covariance (radians) after the reading at tai_s."""
+class Estimate(NamedTuple):
+    """State and covariance, radians."""
 
     raan: float
     mean_anomaly: float
     p_rr: float
     p_rm: float
     p_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class FilterState:
+    """What the filter knows after the reading at tai_s (None: before the first one)."""
+
+    estimate: Estimate
     tai_s: float | None = None
     outlier_count: int = 0  # in a row
 
 
-def initial_state(tuning: KalmanTuning) -> FilterState:
-    """Give the state before the first reading: no correction, diagonal covariance (seed 002, 5.3)."""
-    return FilterState(0.0, 0.0, (tuning.sigma_raan_deg * DEG) ** 2, 0.0, (tuning.sigma_mean_anomaly_deg * DEG) ** 2)
+def initial_estimate(tuning: KalmanTuning) -> Estimate:
+    """Give the estimate before the first reading: no correction, diagonal covariance (seed 002, 5.3)."""
+    return Estimate(0.0, 0.0, (tuning.sigma_raan_deg * DEG) ** 2, 0.0, (tuning.sigma_mean_anomaly_deg * DEG) ** 2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,27 +98,28 @@ class KalmanEstimator(BaseEstimator):
 
     def __init__(self, propagator: Propagator, site: Site, settings: EstimatorSettings) -> None:
         super().__init__(propagator, site, settings)
-        self.state = initial_state(settings.kalman)
+        self.state = FilterState(initial_estimate(settings.kalman))
 
     def _correction(self) -> Correction | None:
-        return Correction(self.state.raan, self.state.mean_anomaly) if self.used_count else None
+        estimate = self.state.estimate
+        return Correction(estimate.raan, estimate.mean_anomaly) if self.used_count else None
 
     def _use(self, readings: Readings) -> list[str | None]:
         reasons: list[str | None] = []
         for k in range(0, len(readings), _BATCH_COUNT):
             part = slice(k, k + _BATCH_COUNT)
-            batch = Readings(readings.tai_s[part], readings.az_deg[part], readings.el_deg[part])
-            reasons += self._take(batch)
+            reasons += self._take(Readings(readings.tai_s[part], readings.az_deg[part], readings.el_deg[part]))
         return reasons
 
     def _take(self, batch: Readings) -> list[str | None]:
-        before = after = self.state
+        after = self.state
         reasons: list[str | None] = []
         for _ in range(_MAX_SWEEPS):
-            at = (after.raan, after.mean_anomaly)
-            line = linearise(self._source, *at, batch.tai_s, self._site)
-            after, reasons = sweep(before, batch, line, self._settings)
-            if max(abs(after.raan - at[0]), abs(after.mean_anomaly - at[1])) < _MOVED_RAD:
+            at = after.estimate
+            line = linearise(self._source, at.raan, at.mean_anomaly, batch.tai_s, self._site)
+            after, reasons = sweep(self.state, batch, line, self._settings)
+            new = after.estimate
+            if max(abs(new.raan - at.raan), abs(new.mean_anomaly - at.mean_anomaly)) < _MOVED_RAD:
                 break
         self.state = after
         return reasons
@@ -119,54 +128,70 @@ class KalmanEstimator(BaseEstimator):
 def sweep(
     state: FilterState, readings: Readings, line: Linearised, settings: EstimatorSettings
 ) -> tuple[FilterState, list[str | None]]:
-    """Take a batch of readings in, one after the other: eqs 4.13 (its K with the transpose it lacks) and 4.15."""
+    """Take a batch of readings in, one after the other (eqs 4.13, 4.15), and give a reason for each one left out.
+
+    An outlier is far from the estimate by its sigma and by the beam.  After many in a row the covariance starts afresh,
+    so that a wrong estimate does not lock the readings out.
+    """
     tuning = settings.kalman
-    q_raan, q_mean = (tuning.walk_raan_deg * DEG) ** 2, (tuning.walk_mean_anomaly_deg * DEG) ** 2
-    floor2 = (tuning.floor_deg * DEG) ** 2
-    r_az, r_el = (settings.sigma_azimuth_deg * DEG) ** 2, (settings.sigma_elevation_deg * DEG) ** 2
+    sigma_az, sigma_el = settings.sigma_azimuth_deg * DEG, settings.sigma_elevation_deg * DEG
     far = settings.beamwidth_deg / 2 * DEG
-    x1, x2, p11, p12, p22 = state.raan, state.mean_anomaly, state.p_rr, state.p_rm, state.p_mm
-    last_tai_s, outlier_count = state.tai_s, state.outlier_count
-    at1, at2 = line.at
-    d_az = ((np.radians(readings.az_deg) - line.az + pi) % (2.0 * pi) - pi).tolist()
-    d_el = (np.radians(readings.el_deg) - line.el).tolist()
-    partials = zip(
-        *(h.tolist() for h in (line.az_by_raan, line.az_by_mean_anomaly, line.el_by_raan, line.el_by_mean_anomaly)),
-        strict=True,
-    )
-    rows = zip(readings.tai_s.tolist(), readings.el_deg.tolist(), d_az, d_el, partials, strict=True)
+    at_raan, at_mean_anomaly = line.at
+    estimate, last_tai_s, outlier_count = state.estimate, state.tai_s, state.outlier_count
     reasons: list[str | None] = []
-    for tai_s, el_deg, az_off, el_off, (a1, a2, e1, e2) in rows:
-        dt_s = 0.0 if last_tai_s is None else tai_s - last_tai_s
+    cos_el = np.maximum(np.cos(np.radians(readings.el_deg)), _LEAST_COS_EL)
+    az_off = (np.radians(readings.az_deg) - line.az + pi) % (2.0 * pi) - pi
+    el_off = np.radians(readings.el_deg) - line.el
+    columns = (readings.tai_s, cos_el, az_off, el_off, line.az_by_raan, line.az_by_mean_anomaly)
+    rows = zip(*(x.tolist() for x in (*columns, line.el_by_raan, line.el_by_mean_anomaly)), strict=True)
+    for tai_s, cos_h, az, el, az_r, az_m, el_r, el_m in rows:
+        estimate = _age(estimate, 0.0 if last_tai_s is None else tai_s - last_tai_s, tuning)
         last_tai_s = tai_s
-        p11 += q_raan * dt_s if p11 < floor2 else 0.0
-        p22 += q_mean * dt_s if p22 < floor2 else 0.0
-        cos_el = max(cos(radians(el_deg)), 1e-3)
-        r = r_az / cos_el**2
-        innovation = az_off - a1 * (x1 - at1) - a2 * (x2 - at2)
-        c1, c2 = p11 * a1 + p12 * a2, p12 * a1 + p22 * a2
-        s = a1 * c1 + a2 * c2 + r
-        el_innovation = el_off - e1 * (x1 - at1) - e2 * (x2 - at2)
-        el_s = e1 * (p11 * e1 + 2 * p12 * e2) + e2 * p22 * e2 + r_el
-        is_outlier = (abs(innovation) > _OUTLIER_SIGMAS * sqrt(s) and abs(innovation) * cos_el > far) or (
-            abs(el_innovation) > _OUTLIER_SIGMAS * sqrt(el_s) and abs(el_innovation) > far
-        )
-        if is_outlier:
-            outlier_count += 1
+        by_az, by_el = (az_r, az_m), (el_r, el_m)
+        az_at = az + az_r * at_raan + az_m * at_mean_anomaly  # what is left is (this) - H x
+        el_at = el + el_r * at_raan + el_m * at_mean_anomaly
+        r_az, r_el = (sigma_az / cos_h) ** 2, sigma_el**2
+        if _is_far(estimate, by_az, az_at, r_az, far / cos_h) or _is_far(estimate, by_el, el_at, r_el, far):
             reasons.append(OUTLIER)
-            if outlier_count >= _RESET_AFTER_COUNT:
-                fresh = initial_state(tuning)
-                p11, p12, p22, outlier_count = fresh.p_rr, fresh.p_rm, fresh.p_mm, 0
+            outlier_count += 1
+            if outlier_count == _RESET_AFTER_COUNT:
+                estimate = Estimate(*estimate[:2], *initial_estimate(tuning)[2:])
+                outlier_count = 0
             continue
-        outlier_count = 0
         reasons.append(None)
-        k1, k2 = c1 / s, c2 / s
-        x1, x2 = x1 + k1 * innovation, x2 + k2 * innovation
-        p11, p12, p22 = p11 - k1 * c1, p12 - k1 * c2, p22 - k2 * c2
-        c1, c2 = p11 * e1 + p12 * e2, p12 * e1 + p22 * e2
-        s = e1 * c1 + e2 * c2 + r_el
-        innovation = el_off - e1 * (x1 - at1) - e2 * (x2 - at2)
-        k1, k2 = c1 / s, c2 / s
-        x1, x2 = x1 + k1 * innovation, x2 + k2 * innovation
-        p11, p12, p22 = p11 - k1 * c1, p12 - k1 * c2, p22 - k2 * c2
-    return FilterState(x1, x2, p11, p12, p22, last_tai_s, outlier_count), reasons
+        outlier_count = 0
+        estimate = update(update(estimate, by_az, az_at, r_az), by_el, el_at, r_el)
+    return FilterState(estimate, last_tai_s, outlier_count), reasons
+
+
+def update(estimate: Estimate, h: tuple[float, float], observed: float, variance: float) -> Estimate:
+    """Take in one scalar, observed = h . state + noise (eq 4.13, K with the transpose it lacks: docs/decisions)."""
+    raan, mean_anomaly, p_rr, p_rm, p_mm = estimate
+    c_r, c_m = p_rr * h[0] + p_rm * h[1], p_rm * h[0] + p_mm * h[1]
+    s = h[0] * c_r + h[1] * c_m + variance
+    k_r, k_m = c_r / s, c_m / s
+    innovation = observed - h[0] * raan - h[1] * mean_anomaly
+    return Estimate(
+        raan + k_r * innovation,
+        mean_anomaly + k_m * innovation,
+        p_rr - k_r * c_r,
+        p_rm - k_r * c_m,
+        p_mm - k_m * c_m,
+    )
+
+
+def _age(estimate: Estimate, dt_s: float, tuning: KalmanTuning) -> Estimate:
+    """Let the time between two readings pass: eq 4.15 with an identity for the transition."""
+    floor = (tuning.floor_deg * DEG) ** 2
+    raan, mean_anomaly, p_rr, p_rm, p_mm = estimate
+    p_rr += (tuning.walk_raan_deg * DEG) ** 2 * dt_s if p_rr < floor else 0.0
+    p_mm += (tuning.walk_mean_anomaly_deg * DEG) ** 2 * dt_s if p_mm < floor else 0.0
+    return Estimate(raan, mean_anomaly, p_rr, p_rm, p_mm)
+
+
+def _is_far(estimate: Estimate, h: tuple[float, float], observed: float, variance: float, far: float) -> bool:
+    off = abs(observed - h[0] * estimate.raan - h[1] * estimate.mean_anomaly)
+    if off <= far:
+        return False
+    s = h[0] * h[0] * estimate.p_rr + 2 * h[0] * h[1] * estimate.p_rm + h[1] * h[1] * estimate.p_mm + variance
+    return off > _OUTLIER_SIGMAS * sqrt(s)

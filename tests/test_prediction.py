@@ -1,0 +1,85 @@
+"""assist.prediction: the buffer, continuous through north and zenith, smooth and exact between its samples."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from made_orbits import EPOCH_TAI_S, circular, site
+from real_passes import sky_angles_deg
+
+from acu_daemon.assist.prediction import predict
+from acu_daemon.model import AxisLimits
+from acu_daemon.orbit.look import look_at
+from acu_daemon.pointing.keyhole import follow_path, longest_window_s
+
+BETWEEN_SAMPLES_DEG = 0.001
+DRIVE = AxisLimits(-270.0, 270.0, 20.0, 10.0)
+OVERHEAD = site(longitude_deg=0.0209)  # the made orbit culminates at 89.8 deg there
+
+
+def _predict(propagator, where, start_s, near_az_deg=0.0, **more):
+    at = EPOCH_TAI_S + start_s
+    return predict(propagator, where, at, made_at_tai_s=at, kind="TLE", near_az_deg=near_az_deg, **more)
+
+
+@pytest.mark.parametrize("where", [OVERHEAD, site(2.0), site(8.0), site(-15.0, 10.0)])
+def test_between_samples_the_path_is_the_satellites(where):
+    propagator = circular()
+    buffer = _predict(propagator, where, -45.0)
+    tai_s = EPOCH_TAI_S - 45.0 + np.arange(0.0, 90.0, 0.017)
+    points = [buffer.at(t) for t in tai_s.tolist()]
+    seen = look_at(propagator, tai_s, where)
+    az, el = (np.array([getattr(p, name) for p in points]) for name in ("az_deg", "el_deg"))
+    assert sky_angles_deg(az, el, seen.az_deg, seen.el_deg).max() < BETWEEN_SAMPLES_DEG
+
+
+def test_the_overhead_pass_of_these_tests_culminates_at_89_8_degrees():
+    assert _predict(circular(), OVERHEAD, -45.0).el_deg.max() == pytest.approx(89.8, abs=0.03)
+
+
+def test_the_rate_is_smooth_across_the_samples_and_is_the_slope_of_the_path():
+    buffer = _predict(circular(), site(2.0), -45.0)
+    for t in buffer.start_tai_s + buffer.step_s * np.arange(1, 900):
+        before, here, after = (buffer.at(t + dt) for dt in (-1e-4, 0.0, 1e-4))
+        assert before.az_rate_deg_s == pytest.approx(after.az_rate_deg_s, abs=1e-3)
+        assert before.el_rate_deg_s == pytest.approx(after.el_rate_deg_s, abs=1e-3)
+        assert (after.az_deg - before.az_deg) / 2e-4 == pytest.approx(here.az_rate_deg_s, abs=1e-3)
+
+
+def test_azimuth_is_continuous_through_north_and_starts_on_the_turn_asked_for():
+    propagator, where = circular(51.6), site(6.0, -3.0)
+    for near_az_deg in (-90.0, 270.0, 620.0):
+        buffer = _predict(propagator, where, 100.0, near_az_deg, horizon_s=150.0)
+        assert abs(buffer.az_deg[0] - near_az_deg) <= 180.0
+        assert np.abs(np.diff(buffer.az_deg)).max() < 1.0
+        assert np.floor(buffer.az_deg.min() / 360.0) < np.floor(buffer.az_deg.max() / 360.0)
+
+
+@pytest.mark.parametrize("offset_deg", [1e-3, -1e-3, 5e-3, 0.0209])
+def test_past_the_zenith_azimuth_turns_by_half_a_turn_the_way_its_rate_says(offset_deg):
+    """From 0.01 deg beside the zenith on, most of the half turn falls into one step."""
+    propagator = circular()
+    buffer = _predict(propagator, site(longitude_deg=offset_deg), -45.0)
+    turned = buffer.az_deg[-1] - buffer.az_deg[0]
+    assert 150.0 < abs(turned) < 210.0
+    assert np.sign(turned) == np.sign(buffer.az_rate_deg_s[np.argmax(np.abs(buffer.az_rate_deg_s))])
+
+
+def test_the_buffer_has_a_pair_every_step_up_to_its_horizon():
+    buffer = _predict(circular(), site(), 0.0)
+    assert buffer.az_deg.size == 901
+    assert buffer.end_tai_s == pytest.approx(EPOCH_TAI_S + 90.0)
+    assert buffer.follow_az_deg.size == 901
+    assert buffer.at(EPOCH_TAI_S - 0.1) is None
+
+
+def test_a_buffer_that_starts_inside_the_keyhole_continues_what_the_one_before_planned():
+    propagator = circular()
+    more = {"lead_in_s": longest_window_s(DRIVE), "follow": partial(follow_path, azimuth=DRIVE)}
+    early = _predict(propagator, OVERHEAD, -45.0, 180.0, **more)
+    assert np.abs(early.follow_az_deg - early.az_deg).max() > 45.0
+    for later_s in (-4.0, -0.3, 0.2, 4.0):
+        skip = round((later_s + 45.0) / early.step_s)
+        late = _predict(propagator, OVERHEAD, later_s, early.az_deg[skip], **more)
+        same = early.az_deg.size - skip
+        assert np.allclose(late.follow_az_deg[:same], early.follow_az_deg[skip:], atol=0.05)
