@@ -6,9 +6,13 @@ from pathlib import Path
 
 import pytest
 import pytest_asyncio
+from hypothesis import settings
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 DATA = SHARED / "data"
+
+settings.register_profile("no-clock", deadline=None)  # a busy machine must not fail a test
+settings.load_profile("no-clock")
 
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="the real data folder ../shared/data is not there")
 
