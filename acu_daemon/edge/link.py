@@ -74,7 +74,7 @@ def check_rate(link: Link, period_s: float, device_delay_s: float) -> None:
     fastest_s = cycle_s((command,), BITS_PER_CHARACTER / max(BAUD_RATES), device_delay_s)
     advice = "use a higher baud rate or a longer period" if fastest_s <= allowed_s else "use a longer period"
     raise UsageError(
-        f"{link.description} cannot carry one WRITE AND STATUS every {period_s * 1e3:g} ms: {character_count} characters"
+        f"{link.description} cannot carry a WRITE AND STATUS every {period_s * 1e3:g} ms: {character_count} characters"
         f" of {link.byte_time_s * 1e3:.3f} ms and {device_delay_s * 1e3:g} ms of device delay"
         f" make {needed_s * 1e3:.1f} ms, and only {allowed_s * 1e3:g} ms (95 % of the period) are allowed; {advice}"
     )

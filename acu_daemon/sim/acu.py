@@ -1,0 +1,326 @@
+"""SIMULATION of the whole ACU with pedestal, receiver and sky, without IO (ICD sections 3 to 5).
+
+Time is TAI seconds; the servo ticks at 50 Hz from start_tai_s on and is stepped lazily up to the time of each call.
+Angles are in the encoder frame, azimuth continuous; the beam points to encoder minus bias.
+"""
+
+from collections.abc import Callable
+
+from acu_daemon.protocol.angles import elevation_deg
+from acu_daemon.protocol.messages import (
+    Ack,
+    AcuMode,
+    ClearChange,
+    Command,
+    Identify,
+    Identity,
+    Nak,
+    Parameter,
+    Poll,
+    ReadFaults,
+    ReadParameter,
+    ReadRegisters,
+    Registers,
+    Reply,
+    ResetFault,
+    SelectBackup,
+    SelectMode,
+    Status,
+    Stop,
+    Stow,
+    WriteAndPoll,
+    WriteParameter,
+    WriteRegisters,
+)
+from acu_daemon.protocol.sa3842 import CommandEvent, encode_reply
+from acu_daemon.sim.antenna import TILT, Antenna
+from acu_daemon.sim.build import AcuBuild
+from acu_daemon.sim.faults import WATCHDOG_BIT, FaultMemory, FaultNibble
+from acu_daemon.sim.modes import BACKUP_MODES, Modes
+from acu_daemon.sim.parameters import Parameters
+from acu_daemon.sim.pedestal import STEP_S
+from acu_daemon.sim.registers import CommandRegisters, turns_within
+from acu_daemon.sim.trace import TraceRow
+
+MODEL = "3842"
+ALLOWED_UNDER_LOCAL = (Identify, Poll, ReadRegisters, Stop, ReadFaults, ReadParameter)
+TRACE_STEPS = 5
+_SLACK_DEG = 1e-6
+_LEFT_BEHIND = {"remote": AcuMode.REMOTE, "stowed": AcuMode.STOWED}  # modes a daemon may find, beside those of power-up
+
+
+class FakeAcu:
+    """One simulated ACU: execute() a command that arrived, advance() to let time pass; time never goes back."""
+
+    def __init__(self, build: AcuBuild) -> None:
+        self.build = build
+        self.address = build.address
+        self.reply_latency_s = build.scenario.acu.reply_latency_s
+        self.observer: Callable[[TraceRow], None] | None = None
+        self._has_tilt = build.scenario.acu.has_tilt
+        self._antenna = Antenna(build)
+        self._tick = 0
+        self._part_s = 0.0
+        mode = build.scenario.acu.mode
+        self._power_up(is_local=mode == "manual")
+        if mode in _LEFT_BEHIND:
+            self._modes.enter(_LEFT_BEHIND[mode], 0.0)
+        self._antenna.move_and_sense(build.start_tai_s, self._parameters.threshold_db)
+        self._seen = self._flags()
+
+    def _power_up(self, *, is_local: bool) -> None:
+        antenna = self._antenna
+        self._parameters = Parameters(self.build.elevation)
+        self._modes = Modes(self._parameters, is_local=is_local)
+        self._modes.entered_s = self._served_s = self._now_s
+        self._registers = CommandRegisters(antenna.az.angle_deg, antenna.el.angle_deg, antenna.tilt_code)
+        self._faults = FaultMemory()
+        self._has_changed = True
+        self._seen = self._flags()
+
+    def power_cycle(self, now_tai_s: float) -> None:
+        """Switch off and on: everything but the antenna's position is forgotten."""
+        self.advance(now_tai_s)
+        self._antenna.lose_power()
+        self._power_up(is_local=not self._modes.is_remote_enabled)
+
+    def set_local(self, is_local: bool, now_tai_s: float) -> None:
+        """Give control to the local panel, or take it back."""
+        self.advance(now_tai_s)
+        self._modes.set_local(is_local, self._now_s)
+        self._note_changes()
+
+    def begin_fault(self, nibble: FaultNibble, bit: int, now_tai_s: float) -> None:
+        """Break something: nibble and bit of the fault detail."""
+        self.advance(now_tai_s)
+        self._faults.begin(nibble, bit)
+
+    def end_fault(self, nibble: FaultNibble, bit: int, now_tai_s: float) -> None:
+        """Mend it."""
+        self.advance(now_tai_s)
+        self._faults.end(nibble, bit)
+
+    @property
+    def _now_s(self) -> float:
+        return self._tick * STEP_S
+
+    @property
+    def _tai_s(self) -> float:
+        return self.build.start_tai_s + self._tick * STEP_S
+
+    def execute(self, event: CommandEvent, now_tai_s: float) -> bytes:
+        """Execute a command at an instant; return the frame of the reply."""
+        self.advance(now_tai_s)
+        reply = Nak() if event.command is None else self.answer(event.command)
+        return encode_reply(event.cmd, reply, self.address)
+
+    def answer(self, command: Command) -> Reply:
+        """Execute a command now."""
+        if not self._modes.is_remote_enabled and not isinstance(command, ALLOWED_UNDER_LOCAL):
+            return Nak()
+        reply = self._answer(command)
+        self._note_changes()
+        return self.status() if isinstance(command, WriteAndPoll) and isinstance(reply, Ack) else reply
+
+    def _answer(self, command: Command) -> Reply:
+        modes, now_s = self._modes, self._now_s
+        match command:
+            case Identify():
+                return Identity(MODEL, "S2" if self._has_tilt else "S1")
+            case Poll():
+                return self.status()
+            case WriteRegisters(az_deg, el_deg, tilt_code):
+                if tilt_code is not None and not self._has_tilt:
+                    return Nak()
+                return self._write(az_deg, el_deg, tilt_code)
+            case WriteAndPoll(az_deg, el_deg, tilt_code):
+                return self._write(az_deg, el_deg, tilt_code if self._has_tilt else None)
+            case ReadRegisters():
+                registers = self._registers
+                return Registers(registers.az_deg, registers.el_deg, registers.tilt_code, registers.count)
+            case SelectMode(mode):
+                return _done(modes.select(mode, self._antenna.receiver.is_acquired, now_s))
+            case SelectBackup(backup):
+                modes.select_backup(backup, now_s)
+            case Stow():
+                return _done(modes.stow(now_s))
+            case Stop():
+                modes.stop(now_s)
+            case ClearChange():
+                modes.is_loss_latched = False
+                self._seen = self._flags()
+                self._has_changed = False
+            case ResetFault():
+                return self._reset_fault()
+            case ReadFaults():
+                return self._faults.detail(is_receiver_valid=self._antenna.receiver.is_valid)
+            case ReadParameter(name):
+                return Parameter(name, self._parameters.code(name))
+            case WriteParameter(name, code):
+                if not self._parameters.is_in_range(name, code):
+                    return Nak()
+                self._has_changed |= self._parameters.write(name, code)
+                self._served_s = now_s
+        return Ack()
+
+    def _write(self, az_deg: float, el_deg: float, tilt_code: int | None) -> Reply:
+        limits = self.build.elevation
+        if not limits.min_deg - _SLACK_DEG <= el_deg <= limits.max_deg + _SLACK_DEG:
+            return Nak()
+        if not turns_within(az_deg, self.build.azimuth):
+            return Nak()
+        if tilt_code is not None and not TILT.min_deg <= elevation_deg(tilt_code) <= TILT.max_deg:
+            return Nak()
+        self._registers.write(az_deg, el_deg, tilt_code)
+        self._modes.are_registers_written = True
+        self._served_s = self._now_s
+        return Ack()
+
+    def _reset_fault(self) -> Reply:
+        had_any = self._faults.has_any
+        if not self._faults.reset():
+            return Nak()
+        if had_any:
+            self._modes.recover(self._now_s)
+        return Ack()
+
+    def status(self) -> Status:
+        """The status block, sampled at the time of the last advance()."""
+        antenna, modes, faults, has_tilt = self._antenna, self._modes, self._faults.remembered, self._has_tilt
+        az, el, tilt, receiver = antenna.az, antenna.el, antenna.tilt, antenna.receiver
+        az_deg, el_deg = antenna.reading_deg(self._part_s)
+        return Status(
+            az_deg=az_deg % 360.0,
+            el_deg=el_deg,
+            mode=modes.mode,
+            tilt_deg=tilt.angle_deg,
+            agc_db=receiver.agc_db,
+            backup_selected=modes.backup,
+            is_backup_active=modes.mode in BACKUP_MODES,
+            is_autotrack_selected=modes.is_autotrack_selected,
+            is_acquired=receiver.is_acquired,
+            is_loss_latched=modes.is_loss_latched,
+            is_track_valid=modes.is_track_valid,
+            is_receiver_valid=receiver.is_valid,
+            is_remote_enabled=modes.is_remote_enabled,
+            are_registers_written=modes.are_registers_written,
+            are_registers_idle=modes.are_registers_written and not modes.follows_registers,
+            has_changed=self._has_changed,
+            has_azimuth_fault=faults.azimuth != 0,
+            has_elevation_fault=faults.elevation != 0,
+            has_tilt_fault=faults.tilt != 0,
+            has_interlock_fault=bool(faults.interlock or faults.encoders or faults.system),
+            is_at_cw_limit=az.is_at_max,
+            is_at_ccw_limit=az.is_at_min,
+            is_azimuth_clamped=az.is_clamped,
+            is_sector_high=antenna.is_sector_high,
+            is_at_up_limit=el.is_at_max,
+            is_at_down_limit=el.is_at_min,
+            is_elevation_clamped=el.is_clamped,
+            is_stow_pin_in=modes.mode is AcuMode.STOWED,
+            is_tilt_fitted=has_tilt,
+            is_tilt_moving=tilt.rate_deg_s != 0.0,
+            is_at_tilt_upper_limit=has_tilt and tilt.is_at_max,
+            is_at_tilt_lower_limit=has_tilt and tilt.is_at_min,
+        )
+
+    def _flags(self) -> tuple[object, ...]:
+        """Everything whose change sets the CHANGE bit, parameters apart."""
+        antenna, modes = self._antenna, self._modes
+        az, el, tilt, receiver = antenna.az, antenna.el, antenna.tilt, antenna.receiver
+        return (
+            modes.mode,
+            modes.backup,
+            modes.is_autotrack_selected,
+            receiver.is_acquired,
+            modes.is_loss_latched,
+            modes.is_track_valid,
+            receiver.is_valid,
+            modes.is_remote_enabled,
+            self._faults.remembered,
+            az.is_clamped,
+            el.is_clamped,
+            az.is_at_max,
+            az.is_at_min,
+            antenna.is_sector_high,
+            el.is_at_max,
+            el.is_at_min,
+            tilt.rate_deg_s != 0.0,
+            tilt.is_at_max,
+            tilt.is_at_min,
+        )
+
+    def _note_changes(self) -> None:
+        flags = self._flags()
+        if flags != self._seen:
+            self._seen = flags
+            self._has_changed = True
+
+    def advance(self, now_tai_s: float) -> None:
+        """Let the servo tick up to an instant; an earlier one changes nothing."""
+        since_start_s = now_tai_s - self.build.start_tai_s
+        last_tick = int(since_start_s / STEP_S + 1e-6)
+        while self._tick < last_tick:
+            self._tick += 1
+            self._step()
+        self._part_s = min(max(since_start_s - self._now_s, 0.0), STEP_S)
+
+    def _step(self) -> None:
+        modes, antenna, now_s = self._modes, self._antenna, self._now_s
+        antenna.move_and_sense(self._tai_s, self._parameters.threshold_db)
+        modes.step(antenna.receiver.is_acquired, now_s)
+        if self._faults.stops_the_drives:
+            modes.leave_autotrack(AcuMode.FAULT, now_s)
+        self._watch_registers(now_s)
+        self._drive(self._registers.step())
+        self._note_changes()
+        if self.observer is not None and self._tick % TRACE_STEPS == 0:
+            self.observer(self.trace_row())
+
+    def _watch_registers(self, now_s: float) -> None:
+        limit_s = self._parameters.watchdog_s
+        if limit_s == 0.0 or not self._modes.follows_registers:
+            return
+        if now_s - max(self._served_s, self._modes.entered_s) >= limit_s:
+            self._modes.leave_autotrack(AcuMode.STANDBY, now_s)
+            self._faults.note("system", WATCHDOG_BIT)
+
+    def _drive(self, is_handed_over: bool) -> None:
+        antenna, mode = self._antenna, self._modes.mode
+        if self._modes.follows_registers:
+            antenna.follow(self._registers.held, is_handed_over, self._parameters.sector_preference)
+        elif mode is AcuMode.AUTOTRACK:
+            antenna.track(self._parameters.lowest_el_deg)
+        elif mode is AcuMode.RATE_MEMORY:
+            antenna.coast()
+        elif mode is not AcuMode.STOWING:
+            antenna.halt()
+        elif antenna.stow():
+            self._modes.enter(AcuMode.STOWED, self._now_s)
+
+    def trace_row(self) -> TraceRow:
+        """What really is at the last tick."""
+        antenna = self._antenna
+        az_deg, el_deg = antenna.boresight_deg
+        direction, offset = antenna.direction, antenna.offset
+        return TraceRow(
+            tai_s=self._tai_s,
+            boresight_az_deg=az_deg % 360.0,
+            boresight_el_deg=el_deg,
+            encoder_az_deg=antenna.az.angle_deg,
+            encoder_el_deg=antenna.el.angle_deg,
+            satellite_az_deg=None if direction is None else direction[0],
+            satellite_el_deg=None if direction is None else direction[1],
+            beam_error_deg=None if offset is None else offset.angle_deg,
+            mode=self._modes.mode,
+            is_acquired=antenna.receiver.is_acquired,
+            agc_db=antenna.receiver.agc_db,
+            register_az_deg=self._registers.az_deg,
+            register_el_deg=self._registers.el_deg,
+            is_followed=self._modes.follows_registers,
+            has_signal=antenna.has_signal,
+        )
+
+
+def _done(is_done: bool) -> Reply:
+    return Ack() if is_done else Nak()

@@ -1,0 +1,115 @@
+"""SIMULATION of the pedestal: an axis with velocity and acceleration limits, driven at 50 Hz (ICD section 5).
+
+Angles are those of the encoder, continuous through north.  Between two steps an axis moves at a constant rate.
+"""
+
+from math import copysign, sqrt
+
+from acu_daemon.model import AxisLimits
+
+STEP_S = 0.02
+POSITION_GAIN_PER_S = 40.0  # following error 1/40 s x rate where no acceleration limit interferes
+BRAKING_SHARE = 0.85  # of the acceleration limit: a 50 Hz servo sees the end of its way a step late
+END_BAND_DEG = 0.005  # this near to a soft limit counts as at it
+
+
+def approach_rate_deg_s(gap_deg: float, gain_per_s: float, acceleration_deg_s2: float) -> float:
+    """Fastest rate at which a gap can be closed without overshoot: linear near the end, square root far from it."""
+    gap = abs(gap_deg)
+    linear_deg = acceleration_deg_s2 / gain_per_s**2
+    if gap <= linear_deg:
+        return gain_per_s * gap_deg
+    return copysign(sqrt(2.0 * acceleration_deg_s2 * (gap - linear_deg / 2.0)), gap_deg)
+
+
+class Axis:
+    """One axis.  Each 50 Hz step: move(), then one of drive_to(), drive_at() and halt()."""
+
+    def __init__(self, limits: AxisLimits, angle_deg: float) -> None:
+        self.limits = limits
+        self.angle_deg = min(max(angle_deg, limits.min_deg), limits.max_deg)
+        self.rate_deg_s = 0.0
+        self.is_clamped = False
+        self._step_deg_s = limits.max_acceleration_deg_s2 * STEP_S
+        self._braking_deg_s2 = BRAKING_SHARE * limits.max_acceleration_deg_s2
+
+    def angle_after_deg(self, after_s: float) -> float:
+        """Angle a part of a step after the last one."""
+        return self.angle_deg + self.rate_deg_s * after_s
+
+    @property
+    def is_at_max(self) -> bool:
+        return self.angle_deg >= self.limits.max_deg - END_BAND_DEG
+
+    @property
+    def is_at_min(self) -> bool:
+        return self.angle_deg <= self.limits.min_deg + END_BAND_DEG
+
+    def move(self) -> None:
+        """Move for one step; the mechanical end is the soft limit."""
+        angle_deg = self.angle_deg + self.rate_deg_s * STEP_S
+        if angle_deg > self.limits.max_deg:
+            angle_deg, self.rate_deg_s = self.limits.max_deg, 0.0
+        elif angle_deg < self.limits.min_deg:
+            angle_deg, self.rate_deg_s = self.limits.min_deg, 0.0
+        self.angle_deg = angle_deg
+
+    def drive_to(self, target_deg: float, target_rate_deg_s: float) -> None:
+        """Close in on a target inside the limits that moves at a known rate."""
+        gap_deg = target_deg - self.angle_after_deg(STEP_S / 2.0)  # a step acts from its middle on
+        self.is_clamped = False
+        closing_deg_s = approach_rate_deg_s(gap_deg, POSITION_GAIN_PER_S, self._braking_deg_s2)
+        self._change_rate(target_rate_deg_s + closing_deg_s)
+
+    def drive_at(self, rate_deg_s: float) -> None:
+        """Drive at a rate, braking before a soft limit."""
+        limits, braking = self.limits, self._braking_deg_s2
+        if rate_deg_s > 0:
+            end_deg_s = approach_rate_deg_s(limits.max_deg - self.angle_deg, POSITION_GAIN_PER_S, braking)
+            self.is_clamped = rate_deg_s > end_deg_s
+        else:
+            end_deg_s = approach_rate_deg_s(limits.min_deg - self.angle_deg, POSITION_GAIN_PER_S, braking)
+            self.is_clamped = rate_deg_s < end_deg_s
+        self._change_rate(end_deg_s if self.is_clamped else rate_deg_s)
+
+    def halt(self) -> None:
+        """Brake to a stand."""
+        self.is_clamped = False
+        self._change_rate(0.0)
+
+    def _change_rate(self, wanted_deg_s: float) -> None:
+        most = self.limits.max_rate_deg_s
+        wanted_deg_s = min(max(wanted_deg_s, -most), most)
+        self.rate_deg_s += min(max(wanted_deg_s - self.rate_deg_s, -self._step_deg_s), self._step_deg_s)
+
+
+class Follower:
+    """The handed-over targets of one axis: the last one, which stands still, and how fast one replaces the other."""
+
+    STALE_S = 0.16  # no new target for this long: the path has ended
+
+    def __init__(self, limits: AxisLimits) -> None:
+        self._limits = limits
+        self._age_s = 0.0
+        self.target_deg = 0.0
+        self.rate_deg_s = 0.0
+
+    def start(self, target_deg: float) -> None:
+        """Begin with a target at rest."""
+        self.target_deg, self.rate_deg_s, self._age_s = target_deg, 0.0, 0.0
+
+    def aim(self, target_deg: float) -> None:
+        """Take the next target, in place of wait()."""
+        self._age_s += STEP_S
+        moved_deg_s = (target_deg - self.target_deg) / self._age_s
+        is_path = self._age_s <= self.STALE_S and abs(moved_deg_s) <= self._limits.max_rate_deg_s
+        most_deg_s = self._limits.max_acceleration_deg_s2 * self._age_s
+        change_deg_s = (moved_deg_s if is_path else 0.0) - self.rate_deg_s
+        self.rate_deg_s += min(max(change_deg_s, -most_deg_s), most_deg_s)
+        self.target_deg, self._age_s = target_deg, 0.0
+
+    def wait(self) -> None:
+        """One step has passed without a new target."""
+        self._age_s += STEP_S
+        if self._age_s > self.STALE_S:
+            self.rate_deg_s = 0.0
