@@ -8,11 +8,13 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from acu_daemon.assist.estimator import EstimatorSettings
+from acu_daemon.config_problems import in_words
 from acu_daemon.control.state import ControlConfig
-from acu_daemon.errors import ConfigError
+from acu_daemon.edge.link import make_link
+from acu_daemon.errors import ConfigError, UsageError
 from acu_daemon.model import AxisLimits, EarthOrientation, Site, Station
 from acu_daemon.orbit.elements import ElementLimits
 from acu_daemon.orbit.timescales import tai_from_utc
@@ -25,7 +27,7 @@ HALF_SERVO_TICK_S = 0.010  # ICD section 6: a command waits for half a 50 Hz ser
 def _tai(value: object) -> float:
     if isinstance(value, datetime):
         if value.tzinfo is None:
-            raise ValueError("the time must end in Z (UTC)")
+            raise ValueError("expected a time that ends in Z (UTC)")
         return tai_from_utc(value.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%S.%fZ"))
     if isinstance(value, str):
         return tai_from_utc(value)
@@ -34,6 +36,7 @@ def _tai(value: object) -> float:
 
 UtcTime = Annotated[float, BeforeValidator(_tai)]
 Positive = Annotated[float, Field(gt=0)]
+Name = Annotated[str, Field(min_length=1)]
 
 
 class Section(BaseModel):
@@ -41,12 +44,17 @@ class Section(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
 
+    def _must_be_below(self, lower: str, upper: str) -> None:
+        low, high = getattr(self, lower), getattr(self, upper)
+        if low >= high:
+            raise ValueError(f"{lower} = {low:g}: expected less than {upper} = {high:g}")
+
 
 class StationSection(Section):
     latitude_deg: float = Field(ge=-90, le=90)
     longitude_deg: float = Field(ge=-180, le=360)
     height_m: float = Field(ge=-500, le=9000)
-    name: str = "station"
+    name: Name = "station"
     min_elevation_deg: float = Field(default=5.0, ge=0, lt=90)
     uncertainty_m: float = Field(default=0.0, ge=0)
 
@@ -59,12 +67,16 @@ class AxisSection(Section):
 
     @model_validator(mode="after")
     def _min_below_max(self) -> "AxisSection":
-        if self.min_deg >= self.max_deg:
-            raise ValueError(f"min_deg must be below max_deg = {self.max_deg:g}")
+        self._must_be_below("min_deg", "max_deg")
         return self
 
     def limits(self) -> AxisLimits:
         return AxisLimits(self.min_deg, self.max_deg, self.max_rate_deg_s, self.max_acceleration_deg_s2)
+
+
+class ElevationSection(AxisSection):
+    min_deg: float = Field(ge=-90, le=180)
+    max_deg: float = Field(ge=-90, le=180)
 
 
 def _address(value: object) -> str:
@@ -73,10 +85,18 @@ def _address(value: object) -> str:
     return text
 
 
+def _url(value: str) -> str:
+    try:
+        make_link(value)
+    except UsageError as error:
+        raise ValueError(str(error)) from None
+    return value
+
+
 class AcuSection(Section):
-    url: str
+    url: Annotated[str, AfterValidator(_url)]
     azimuth: AxisSection
-    elevation: AxisSection
+    elevation: ElevationSection
     dialect: Literal["sa3842"] = "sa3842"
     address: Annotated[str, BeforeValidator(_address)] = "1"
     period_s: float = Field(default=0.1, ge=0.1, le=1.0)
@@ -112,8 +132,7 @@ class TrackingSection(Section):
 
     @model_validator(mode="after")
     def _water_below_horizon(self) -> "TrackingSection":
-        if self.low_water_s >= self.horizon_s:
-            raise ValueError(f"low_water_s must be below horizon_s = {self.horizon_s:g}")
+        self._must_be_below("low_water_s", "horizon_s")
         return self
 
 
@@ -140,7 +159,7 @@ class StationFile(Section):
 
 
 class SatelliteSection(Section):
-    name: str
+    name: Name
     norad_id: int | None = Field(default=None, ge=1, le=999999999)
 
 
@@ -155,6 +174,12 @@ class LimitsSection(Section):
     max_inclination_deg: float = Field(default=DEFAULT_LIMITS.max_inclination_deg, ge=0, le=180)
     warn_age_days: Positive = DEFAULT_LIMITS.warn_age_days
     max_age_days: Positive = DEFAULT_LIMITS.max_age_days
+
+    @model_validator(mode="after")
+    def _min_below_max(self) -> "LimitsSection":
+        for what in ("semi_major_axis_km", "eccentricity", "inclination_deg"):
+            self._must_be_below(f"min_{what}", f"max_{what}")
+        return self
 
     def limits(self) -> ElementLimits:
         return ElementLimits(**self.model_dump())
@@ -205,18 +230,19 @@ File = TypeVar("File", bound=Section)
 
 def load_station(directory: Path) -> StationFile:
     """Read DIR/station.toml.  ConfigError: names file, key, value and what was expected."""
-    return _parse(StationFile, directory / "station.toml", _read(directory / "station.toml"))
+    path = directory / "station.toml"
+    return _parse(StationFile, path, _read(path))
 
 
 def satellite_names(directory: Path) -> list[str]:
     """Names of the satellites' files, sorted."""
-    return sorted(path.stem for path in (directory / "satellites").glob("*.toml"))
+    return sorted(path.stem for path in (directory / "satellites").glob("[!.]*.toml"))
 
 
 def load_satellite(directory: Path, name: str, station: StationFile) -> tuple[SatelliteFile, StationFile]:
     """Read DIR/satellites/NAME.toml; also the station with that file's overrides applied."""
     path = directory / "satellites" / f"{name}.toml"
-    if not path.is_file():
+    if not path.exists():
         known = ", ".join(satellite_names(directory)) or "none"
         raise ConfigError(f"{path}: no such file; satellites in {directory}: {known}")
     satellite = _parse(SatelliteFile, path, _read(path))
@@ -233,12 +259,14 @@ def load_satellite(directory: Path, name: str, station: StationFile) -> tuple[Sa
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise ConfigError(f"{path}: no such file; it must hold the station's [station] and [acu] tables") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: cannot be read: {error}") from None
-    except tomllib.TOMLDecodeError as error:
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: byte {error.start}: expected UTF-8 text; save the file in that encoding") from None
+    except (ValueError, RecursionError) as error:  # tomllib's own errors, and numbers or nesting beyond Python's limits
         raise ConfigError(f"{path}: not TOML: {error}") from None
 
 
@@ -246,21 +274,8 @@ def _parse(model: type[File], path: Path, values: dict[str, Any], under: str = "
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        problems = [_problem(path, under, dict(item)) for item in error.errors()]
+        problems = [f"{path}: {in_words(dict(item), under)}" for item in error.errors()]
         raise ConfigError("\n".join(problems)) from None
-
-
-def _problem(path: Path, under: str, item: dict[str, Any]) -> str:
-    """One line of the complaint: file, key, value, what was expected."""
-    parts = [str(part) for part in item["loc"] if part not in ("tle", "omm", "oem", "brouwer")]
-    key = ".".join(([under] if under else []) + parts)
-    if item["type"] == "missing":
-        return f"{path}: {key} is missing"
-    if item["type"] == "extra_forbidden":
-        return f"{path}: {key} = {item['input']!r}: unknown key; is it misspelt, or in the wrong table?"
-    expected = item["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-    value = "" if isinstance(item["input"], dict) else f" = {item['input']!r}"
-    return f"{path}: {key}{value}: expected {expected}"
 
 
 def control_config(station: StationFile, satellite: SatelliteFile, byte_time_s: float) -> ControlConfig:

@@ -1,0 +1,292 @@
+"""TOML files: what loads, every default, and every kind of mistake in an operator's words."""
+
+import tempfile
+from pathlib import Path
+
+import pytest
+from config_files import BROUWER, STATION, replaced, write
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acu_daemon.config import control_config, estimator_settings, load_satellite, load_station, satellite_names
+from acu_daemon.config_problems import in_words
+from acu_daemon.errors import ConfigError
+from acu_daemon.orbit.timescales import tai_from_utc
+
+SHIPPED = Path(__file__).resolve().parents[1] / "config"
+BYTE_9600_S = 10 / 9600
+
+
+def complaint(directory: Path, satellite: str = "scd") -> str:
+    """What loading says, with the directory's name as DIR."""
+    with pytest.raises(ConfigError) as error:
+        load_satellite(directory, satellite, load_station(directory))
+    return str(error.value).replace(str(directory), "DIR")
+
+
+@pytest.mark.parametrize("name", satellite_names(SHIPPED))
+def test_every_file_that_is_shipped_loads(name: str) -> None:
+    load_satellite(SHIPPED, name, load_station(SHIPPED))
+
+
+def test_two_satellites_are_shipped() -> None:
+    assert satellite_names(SHIPPED) == ["demo-1", "scd-1"]
+
+
+def test_every_default_is_the_one_of_the_design(tmp_path: Path) -> None:
+    write(tmp_path)
+    base = load_station(tmp_path)
+    satellite, station = load_satellite(tmp_path, "scd", base)
+    assert station == base
+    assert station.station.min_elevation_deg == 5.0
+    acu = station.acu
+    assert (acu.dialect, acu.address, acu.period_s, acu.device_delay_s) == ("sa3842", "1", 0.1, 0.010)
+    assert (station.receiver.beamwidth_deg, station.receiver.lock_dwell_s) == (1.0, 1.0)
+    assert station.time.ut1_utc_s == 0.0
+    readings = station.readings
+    assert (readings.sigma_azimuth_deg, readings.sigma_elevation_deg) == (0.05, 0.05)
+    assert (readings.bias_sigma_azimuth_deg, readings.bias_sigma_elevation_deg) == (0.1, 0.1)
+    tracking = station.tracking
+    assert (tracking.horizon_s, tracking.low_water_s, tracking.max_fit_elevation_deg) == (90.0, 30.0, 80.0)
+    assert tracking.estimator == "full"
+    assert station.safety.arm == "auto"
+    assert satellite.satellite.norad_id is None
+    assert (satellite.fallback.hold_s, satellite.fallback.search_s) == (1200.0, 120.0)
+    assert (satellite.uncertainty.position_km, satellite.uncertainty.velocity_m_s) == (None, None)
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        *("station.latitude_deg", "station.longitude_deg", "station.height_m", "acu.url"),
+        *(f"acu.azimuth.{key}" for key in ("min_deg", "max_deg", "max_rate_deg_s", "max_acceleration_deg_s2")),
+        *(f"acu.elevation.{key}" for key in ("min_deg", "max_deg", "max_rate_deg_s", "max_acceleration_deg_s2")),
+    ],
+)
+def test_a_station_needs_its_position_the_acu_and_the_limits_of_its_axes(tmp_path: Path, key: str) -> None:
+    table, _, last = key.rpartition(".")
+    before, header, after = STATION.partition(f"[{table}]\n")
+    removed = next(line for line in after.splitlines(keepends=True) if line.startswith(f"{last} ="))
+    write(tmp_path, before + header + after.replace(removed, "", 1))
+    assert complaint(tmp_path) == f"DIR/station.toml: {key} is missing; it has no default"
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        *("name", "kind", "epoch_utc", "semi_major_axis_km", "eccentricity", "inclination_deg", "raan_deg"),
+        *("arg_perigee_deg", "mean_anomaly_deg"),
+    ],
+)
+def test_a_satellite_needs_its_name_and_elements(tmp_path: Path, key: str) -> None:
+    lines = BROUWER.splitlines(keepends=True)
+    write(tmp_path, scd="".join(line for line in lines if not line.startswith(f"{key} =")))
+    table = "satellite" if key == "name" else "elements"
+    assert complaint(tmp_path).startswith(f"DIR/satellites/scd.toml: {table}.{key} is missing")
+
+
+AZIMUTH_MIN = "min_deg = -270.0"
+LATITUDE = "latitude_deg = -15.53"
+STATION_MISTAKES = [
+    (LATITUDE, "lattitude_deg = -15.53", "station.latitude_deg is missing; it has no default"),
+    (LATITUDE, f"{LATITUDE}\nlat = 1.5", "station.lat = 1.5: unknown key; is it misspelt, or in the wrong table?"),
+    (LATITUDE, 'latitude_deg = "15 S"', 'station.latitude_deg = "15 S": expected a number'),
+    (LATITUDE, "latitude_deg = true", "station.latitude_deg = true: expected a number"),
+    (LATITUDE, "latitude_deg = [1]", "station.latitude_deg = [1]: expected a number"),
+    (LATITUDE, "latitude_deg = 90.5", "station.latitude_deg = 90.5: expected at most 90"),
+    (LATITUDE, "latitude_deg = nan", "station.latitude_deg = nan: expected a finite number"),
+    (LATITUDE, "latitude_deg = -inf", "station.latitude_deg = -inf: expected a finite number"),
+    (LATITUDE, "latitude_deg = 1e999", "station.latitude_deg = inf: expected a finite number"),
+    (LATITUDE, f"latitude_deg = {'9' * 400}", f"station.latitude_deg = {'9' * 60}...: expected a number"),
+    (LATITUDE, f'{LATITUDE}\nname = ""', 'station.name = "": expected a text that is not empty'),
+    (LATITUDE, f"{LATITUDE}\nname = 5", "station.name = 5: expected text in quotes"),
+    (AZIMUTH_MIN, "min_deg = 300.0", "acu.azimuth.min_deg = 300: expected less than max_deg = 270"),
+    (AZIMUTH_MIN, "min_deg = -9999.0", "acu.azimuth.min_deg = -9999.0: expected at least -720"),
+    ("max_deg = 90.0", "max_deg = 270.0", "acu.elevation.max_deg = 270.0: expected at most 180"),
+    ("max_rate_deg_s = 5.0", "max_rate_deg_s = 0", "acu.elevation.max_rate_deg_s = 0: expected more than 0"),
+    ("[acu]", "[acu]\nperiod_s = 0.01", "acu.period_s = 0.01: expected at least 0.1"),
+    ("[acu]", '[acu]\ndialect = "x"', "acu.dialect = \"x\": expected 'sa3842'"),
+    ("[acu]", "[acu]\naddress = 12", "acu.address = 12: '12' is not an ACU address, expected one character"),
+    ("tcp://127.0.0.1:3842", "tcp://127.0.0.1", 'acu.url = "tcp://127.0.0.1": link'),
+    ("tcp://127.0.0.1:3842", "com1", "acu.url = \"com1\": link 'com1' is not understood; expected tcp://HOST:PORT"),
+    ("tcp://127.0.0.1:3842", "serial:///dev/x?baud=9", 'acu.url = "serial:///dev/x?baud=9": link'),
+    ("[acu.azimuth]", "[acu.az]", "acu.azimuth is missing; it has no default"),
+    ("[station]", "[statoin]", "station is missing; it has no default"),
+    ("[station]", "[[station]]", "station = [{'latitude_deg': -15.53"),
+    ("[station]", "[tracking]\nestimator = 'best'\n[station]", "tracking.estimator = \"best\": expected 'circular',"),
+    ("[station]", "[tracking]\nlow_water_s = 95.0\n[station]", "tracking.low_water_s = 95: expected less than horizon"),
+    ("[station]", "[safety]\narm = true\n[station]", "safety.arm = true: expected 'auto' or 'manual'"),
+    ("[station]", "[time]\nut1_utc_s = -1.5\n[station]", "time.ut1_utc_s = -1.5: expected at least -1"),
+    ("[station]", "[receiver]\nbeamwidth_deg = 0\n[station]", "receiver.beamwidth_deg = 0: expected more than 0"),
+    ("[station]", "[station", "not TOML: Expected ']' at the end of a table declaration (at line 2, column 9)"),
+    (LATITUDE, f"latitude_deg = {'9' * 5000}", "not TOML: Exceeds the limit"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "said"), STATION_MISTAKES)
+def test_a_mistake_in_the_stations_file_is_told_with_file_key_value_and_what_was_expected(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    write(tmp_path, replaced(STATION, old, new))
+    assert complaint(tmp_path).startswith(f"DIR/station.toml: {said}")
+
+
+EPOCH = "epoch_utc = 1989-01-31T09:58:00Z"
+SATELLITE_MISTAKES = [
+    (EPOCH, EPOCH[:-1], "elements.epoch_utc = 1989-01-31T09:58:00: expected a time that ends in Z (UTC)"),
+    (EPOCH, "epoch_utc = 1989-01-31", "elements.epoch_utc = 1989-01-31: expected a time like 1989-01-31T09:58:00Z"),
+    (EPOCH, "epoch_utc = 09:58:00", "elements.epoch_utc = 09:58:00: expected a time like 1989-01-31T09:58:00Z"),
+    (EPOCH, "epoch_utc = 1989.1", "elements.epoch_utc = 1989.1: expected a time like 1989-01-31T09:58:00Z"),
+    (EPOCH, 'epoch_utc = "1989"', 'elements.epoch_utc = "1989": expected UTC as YYYY-MM-DDThh:mm:ss[.fff]Z'),
+    (EPOCH, "epoch_utc = 1989-02-30T00:00:00Z", "not TOML: Invalid date or datetime (at line 6, column 13)"),
+    ("eccentricity = 0.0436", "eccentricity = 1.0", "elements.eccentricity = 1.0: expected less than 1"),
+    ("7180.0", "nan", "elements.semi_major_axis_km = nan: expected a finite number"),
+    ('kind = "brouwer"', 'kind = "sgp4"', 'elements.kind = "sgp4": expected one of tle, omm, oem, brouwer'),
+    ('kind = "brouwer"', "kind = 4", 'elements.kind = "4": expected one of tle, omm, oem, brouwer'),
+    ('kind = "brouwer"', 'kind = "tle"', "elements.file is missing; it has no default"),
+    ('kind = "brouwer"', 'kind = "brouwer"\ntle = 1', "elements.tle = 1: unknown key"),
+    ("[elements]", "[element]", "elements is missing; it has no default"),
+    ('name = "SCD-1"', 'name = ""', 'satellite.name = "": expected a text that is not empty'),
+    ('name = "SCD-1"', 'name = "S"\nnorad_id = "22490"', 'satellite.norad_id = "22490": expected a whole number'),
+    ('name = "SCD-1"', 'name = "S"\nnorad_id = 0', "satellite.norad_id = 0: expected at least 1"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "said"), SATELLITE_MISTAKES)
+def test_a_mistake_in_a_satellites_file_is_told_alike(tmp_path: Path, old: str, new: str, said: str) -> None:
+    write(tmp_path, scd=replaced(BROUWER, old, new))
+    assert complaint(tmp_path).startswith(f"DIR/satellites/scd.toml: {said}")
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ("[uncertainty]\nposition_km = 0", "uncertainty.position_km = 0: expected more than 0"),
+        ("[fallback]\nhold = 3", "fallback.hold = 3: unknown key"),
+        (
+            "[elements.limits]\nmin_semi_major_axis_km = 42000",
+            "elements.limits.min_semi_major_axis_km = 42000: expected less than max_semi_major_axis_km = 8500",
+        ),
+        ("[elements.limits]\nmax_eccentricity = 1", "elements.limits.max_eccentricity = 1: expected less than 1"),
+        ("[station]\nheight_m = 1", "station: unknown key"),
+        ('[tracking]\nestimater = "full"', 'tracking.estimater = "full": unknown key'),
+        ("[tracking]\nlow_water_s = 90", "tracking.low_water_s = 90: expected less than horizon_s = 90"),
+        ("[readings]\nsigma_azimuth_deg = inf", "readings.sigma_azimuth_deg = inf: expected a finite number"),
+        ('[receiver]\nbeamwidth_deg = "1"', 'receiver.beamwidth_deg = "1": expected a number'),
+    ],
+)
+def test_a_mistake_in_a_table_of_a_satellite_or_in_an_override_is_told_alike(
+    tmp_path: Path, table: str, said: str
+) -> None:
+    write(tmp_path, scd=f"{BROUWER}{table}\n")
+    assert complaint(tmp_path).startswith(f"DIR/satellites/scd.toml: {said}")
+
+
+def test_a_number_in_place_of_an_overriding_table_is_told(tmp_path: Path) -> None:
+    write(tmp_path, scd=f"receiver = 3\n{BROUWER}")
+    assert complaint(tmp_path) == "DIR/satellites/scd.toml: receiver = 3: expected a table"
+
+
+def test_every_mistake_has_a_line_of_its_own(tmp_path: Path) -> None:
+    text = replaced(replaced(STATION, "[acu]", "[acu]\nport = 1"), LATITUDE, "latitude_deg = 100")
+    lines = complaint(write(tmp_path, text)).splitlines()
+    assert len(lines) == 2
+    assert all(line.startswith("DIR/station.toml: ") for line in lines)
+
+
+def test_a_satellite_overrides_any_key_of_tracking_readings_and_receiver(tmp_path: Path) -> None:
+    override = "[tracking]\nhorizon_s = 60\n[readings]\nsigma_elevation_deg = 0.01\n[receiver]\nlock_dwell_s = 3"
+    write(tmp_path, f"{STATION}[tracking]\nlow_water_s = 20.0\n", scd=f"{BROUWER}{override}\n")
+    base = load_station(tmp_path)
+    _, station = load_satellite(tmp_path, "scd", base)
+    assert (station.tracking.horizon_s, station.tracking.low_water_s) == (60.0, 20.0)
+    assert (station.readings.sigma_azimuth_deg, station.readings.sigma_elevation_deg) == (0.05, 0.01)
+    assert station.receiver.lock_dwell_s == 3.0
+    assert base.receiver.lock_dwell_s == 1.0
+
+
+def test_a_satellite_that_is_not_there_is_told_with_those_that_are(tmp_path: Path) -> None:
+    write(tmp_path, one=BROUWER, two=BROUWER)
+    (tmp_path / "satellites" / ".#two.toml").write_text("an editor's lock")
+    assert complaint(tmp_path, "three") == "DIR/satellites/three.toml: no such file; satellites in DIR: one, two"
+
+
+def test_a_directory_without_files_is_told(tmp_path: Path) -> None:
+    assert complaint(tmp_path).startswith("DIR/station.toml: no such file; it must hold")
+
+
+def test_a_directory_in_place_of_a_file_is_told(tmp_path: Path) -> None:
+    (tmp_path / "station.toml").mkdir()
+    assert complaint(tmp_path) == "DIR/station.toml: cannot be read: Is a directory"
+    write(tmp_path / "other")
+    (tmp_path / "other" / "satellites" / "dir.toml").mkdir()
+    assert complaint(tmp_path / "other", "dir") == "DIR/satellites/dir.toml: cannot be read: Is a directory"
+
+
+def test_a_file_in_place_of_the_directory_is_told(tmp_path: Path) -> None:
+    file = tmp_path / "config"
+    file.write_text(STATION)
+    assert complaint(file) == "DIR/station.toml: cannot be read: Not a directory"
+
+
+def test_a_file_that_is_not_utf_8_is_told(tmp_path: Path) -> None:
+    text = f"{STATION}# São José dos Campos"
+    assert complaint(write(tmp_path, text.encode("latin-1"))) == (
+        f"DIR/station.toml: byte {len(STATION) + 3}: expected UTF-8 text; save the file in that encoding"
+    )
+    assert "expected UTF-8 text" in complaint(write(tmp_path, STATION.encode("utf-16")))
+
+
+@pytest.mark.parametrize("text", [STATION.replace("\n", "\r\n").encode(), STATION.encode("utf-8-sig")])
+def test_windows_line_ends_and_a_byte_order_mark_do_not_matter(tmp_path: Path, text: bytes) -> None:
+    write(tmp_path / "plain")
+    assert load_station(write(tmp_path, text)) == load_station(tmp_path / "plain")
+
+
+def test_an_epoch_may_be_a_text_and_lie_in_a_leap_second(tmp_path: Path) -> None:
+    text = replaced(BROUWER, EPOCH, 'epoch_utc = "2016-12-31T23:59:60.5Z"')
+    satellite, _ = load_satellite(write(tmp_path, scd=text), "scd", load_station(tmp_path))
+    assert satellite.elements.epoch_utc == tai_from_utc("2016-12-31T23:59:60.5Z")  # type: ignore[union-attr]
+
+
+def test_an_epoch_with_another_offset_is_turned_into_utc(tmp_path: Path) -> None:
+    text = replaced(BROUWER, EPOCH, "epoch_utc = 1989-01-31T07:58:00.25-02:00")
+    satellite, _ = load_satellite(write(tmp_path, scd=text), "scd", load_station(tmp_path))
+    assert satellite.elements.epoch_utc == tai_from_utc("1989-01-31T09:58:00.25Z")  # type: ignore[union-attr]
+
+
+@given(st.binary(max_size=200))
+def test_whatever_a_file_holds_the_answer_is_a_configuration_error(data: bytes) -> None:
+    with tempfile.TemporaryDirectory() as directory, pytest.raises(ConfigError, match=r"station\.toml: "):
+        load_station(write(Path(directory), data))
+
+
+def test_an_error_without_words_of_ours_keeps_the_checkers_own() -> None:
+    item = {"type": "new_kind", "loc": ("a", "b"), "input": 1, "msg": "Input should be green"}
+    assert in_words(item) == "a.b = 1: Input should be green"
+
+
+def test_the_delays_of_a_tick_follow_the_arithmetic_of_the_icd(tmp_path: Path) -> None:
+    write(tmp_path)
+    satellite, station = load_satellite(tmp_path, "scd", load_station(tmp_path))
+    over_tcp = control_config(station, satellite, 0.0)
+    assert (over_tcp.sample_delay_s, over_tcp.poll_sample_delay_s) == (0.010, 0.010)
+    assert over_tcp.effect_delay_s == pytest.approx(0.020)
+    serial = control_config(station, satellite, BYTE_9600_S)
+    assert serial.sample_delay_s == pytest.approx(17 * BYTE_9600_S + 0.010)
+    assert serial.poll_sample_delay_s == pytest.approx(5 * BYTE_9600_S + 0.010)
+    assert serial.effect_delay_s - serial.sample_delay_s == pytest.approx(0.010)
+
+
+def test_the_rooms_get_what_the_files_say(tmp_path: Path) -> None:
+    more = '[safety]\narm = "manual"\n[tracking]\nmax_fit_elevation_deg = 70\n[readings]\nsigma_azimuth_deg = 0.02\n'
+    write(tmp_path, STATION + more, scd=f"{BROUWER}[fallback]\nhold_s = 7\nsearch_s = 8\nacquire_s = 9\n")
+    satellite, station = load_satellite(tmp_path, "scd", load_station(tmp_path))
+    control = control_config(station, satellite, 0.0)
+    assert not control.is_armed
+    assert (control.hold_s, control.search_s, control.acquire_s) == (7, 8, 9)
+    assert (control.azimuth.min_deg, control.elevation.max_rate_deg_s) == (-270.0, 5.0)
+    settings = estimator_settings(station)
+    assert (settings.max_fit_elevation_deg, settings.sigma_azimuth_deg) == (70, 0.02)
+    assert settings.azimuth == control.azimuth
+    assert (station.site.station.latitude_deg, station.site.station.height_m) == (-15.53, 277.0)
