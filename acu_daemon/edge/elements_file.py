@@ -6,13 +6,14 @@ from pathlib import Path
 from acu_daemon.config import BrouwerSection, ElementsFileSection, SatelliteFile
 from acu_daemon.errors import ElementsError
 from acu_daemon.orbit.brouwer import BrouwerElements, BrouwerPropagator
-from acu_daemon.orbit.elements import check_brouwer, check_elements, select_elements
+from acu_daemon.orbit.elements import Problem, check_brouwer, check_elements, select_elements
 from acu_daemon.orbit.omm import parse_omm
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator
 from acu_daemon.orbit.tle import parse_tle
 from acu_daemon.units import DEG
 
+NAMED_PROBLEMS = 5
 _PARSERS = {"tle": parse_tle, "omm": parse_omm}
 
 
@@ -65,12 +66,19 @@ def _from_file(
         raise ElementsError(f"{toml_path}: elements.file = {section.file!r}: {path}: {error.strerror}") from None
     sets, problems = _PARSERS[section.kind](text, str(path))
     if not sets:
-        reasons = "\n".join(str(problem) for problem in problems[:5])
-        raise ElementsError(reasons or f"{path}: no element set in the file")
+        raise ElementsError("\n".join(_few(problems)) or f"{path}: no element set in the file")
+    wanted = satellite.satellite
     try:
-        chosen, warnings = select_elements(sets, satellite.satellite.norad_id, satellite.satellite.name, now_tai_s)
+        chosen, warnings = select_elements(sets, wanted.norad_id, wanted.name, now_tai_s, is_whole=not problems)
     except ElementsError as error:
-        raise ElementsError("\n".join([str(error), *(str(problem) for problem in problems[:5])])) from None
+        raise ElementsError("\n".join([str(error), *_few(problems)])) from None
     errors, more = check_elements(chosen, section.limits.limits(), now_tai_s)
-    warnings = [*warnings, *more, *(str(problem) for problem in problems)]
+    warnings = [*warnings, *more, *_few(problems)]
     return LoadedElements(Sgp4Propagator(chosen), chosen.label, chosen.epoch_tai_s, errors, warnings)
+
+
+def _few(problems: list[Problem]) -> list[str]:
+    """The first problems as texts, and how many there are beside them."""
+    texts = [str(problem) for problem in problems[:NAMED_PROBLEMS]]
+    left = len(problems) - len(texts)
+    return [*texts, f"{problems[0].file}: {left} more element sets cannot be read"] if left else texts

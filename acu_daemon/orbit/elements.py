@@ -89,12 +89,13 @@ def _check(
 
 
 def select_elements(
-    sets: Sequence[ElementSet], norad_id: int | None, name: str | None, now_tai_s: float
+    sets: Sequence[ElementSet], norad_id: int | None, name: str | None, now_tai_s: float, *, is_whole: bool = True
 ) -> tuple[ElementSet, list[str]]:
     """Choose a satellite's element set: the newest not after now, else the oldest.
 
     Searched by `norad_id` if given; else, in a list of several satellites, by name (case, hyphens and blanks do not
-    count).  A file with one satellite needs neither.
+    count).  A file with one satellite needs neither; without is_whole, sets of the file could not be read, and the one
+    satellite left may be another.
 
     Returns: the set, and warnings.
     Raises:  ElementsError: no set, none of this satellite, or a name that two satellites bear.
@@ -104,7 +105,7 @@ def select_elements(
     found = list(sets)
     if norad_id is not None:
         found = _matching(sets, lambda one: one.norad_id == norad_id, f"norad_id {norad_id}")
-    elif len({one.norad_id for one in sets}) > 1:
+    elif not is_whole or len({one.norad_id for one in sets}) > 1:
         if name is None:
             raise ElementsError(f"{sets[0].file}: {_contents(sets)}; say which by norad_id")
         found = _matching(sets, lambda one: _plain(one.name) == _plain(name), f"name {name!r}")
