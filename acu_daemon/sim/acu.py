@@ -34,10 +34,10 @@ from acu_daemon.protocol.messages import (
 )
 from acu_daemon.protocol.sa3842 import CommandEvent, encode_reply
 from acu_daemon.sim.antenna import TILT, Antenna
-from acu_daemon.sim.build import AcuBuild
 from acu_daemon.sim.faults import WATCHDOG_BIT, FaultMemory, FaultNibble
 from acu_daemon.sim.modes import BACKUP_MODES, Modes
 from acu_daemon.sim.parameters import Parameters
+from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.pedestal import STEP_S
 from acu_daemon.sim.registers import CommandRegisters, turns_within
 from acu_daemon.sim.trace import TraceRow
@@ -52,25 +52,25 @@ _LEFT_BEHIND = {"remote": AcuMode.REMOTE, "stowed": AcuMode.STOWED}  # modes a d
 class FakeAcu:
     """One simulated ACU: execute() a command that arrived, advance() to let time pass; time never goes back."""
 
-    def __init__(self, build: AcuBuild) -> None:
-        self.build = build
-        self.address = build.address
-        self.reply_latency_s = build.scenario.acu.reply_latency_s
+    def __init__(self, parts: AcuParts) -> None:
+        self.parts = parts
+        self.address = parts.address
+        self.reply_latency_s = parts.scenario.acu.reply_latency_s
         self.observer: Callable[[TraceRow], None] | None = None
-        self._has_tilt = build.scenario.acu.has_tilt
-        self._antenna = Antenna(build)
+        self._has_tilt = parts.scenario.acu.has_tilt
+        self._antenna = Antenna(parts)
         self._tick = 0
         self._part_s = 0.0
-        mode = build.scenario.acu.mode
+        mode = parts.scenario.acu.mode
         self._power_up(is_local=mode == "manual")
         if mode in _LEFT_BEHIND:
             self._modes.enter(_LEFT_BEHIND[mode], 0.0)
-        self._antenna.move_and_sense(build.start_tai_s, self._parameters.threshold_db)
+        self._antenna.move_and_sense(parts.start_tai_s, self._parameters.threshold_db)
         self._seen = self._flags()
 
     def _power_up(self, *, is_local: bool) -> None:
         antenna = self._antenna
-        self._parameters = Parameters(self.build.elevation)
+        self._parameters = Parameters(self.parts.elevation)
         self._modes = Modes(self._parameters, is_local=is_local)
         self._modes.entered_s = self._served_s = self._now_s
         self._registers = CommandRegisters(antenna.az.angle_deg, antenna.el.angle_deg, antenna.tilt_code)
@@ -106,7 +106,7 @@ class FakeAcu:
 
     @property
     def _tai_s(self) -> float:
-        return self.build.start_tai_s + self._tick * STEP_S
+        return self.parts.start_tai_s + self._tick * STEP_S
 
     def execute(self, event: CommandEvent, now_tai_s: float) -> bytes:
         """Execute a command at an instant; return the frame of the reply."""
@@ -164,10 +164,10 @@ class FakeAcu:
         return Ack()
 
     def _write(self, az_deg: float, el_deg: float, tilt_code: int | None) -> Reply:
-        limits = self.build.elevation
+        limits = self.parts.elevation
         if not limits.min_deg - _SLACK_DEG <= el_deg <= limits.max_deg + _SLACK_DEG:
             return Nak()
-        if not turns_within(az_deg, self.build.azimuth):
+        if not turns_within(az_deg, self.parts.azimuth):
             return Nak()
         if tilt_code is not None and not TILT.min_deg <= elevation_deg(tilt_code) <= TILT.max_deg:
             return Nak()
@@ -258,7 +258,7 @@ class FakeAcu:
 
     def advance(self, now_tai_s: float) -> None:
         """Let the servo tick up to an instant; an earlier one changes nothing."""
-        since_start_s = now_tai_s - self.build.start_tai_s
+        since_start_s = now_tai_s - self.parts.start_tai_s
         last_tick = int(since_start_s / STEP_S + 1e-6)
         while self._tick < last_tick:
             self._tick += 1

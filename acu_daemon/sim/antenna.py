@@ -11,7 +11,7 @@ from random import Random
 from acu_daemon.model import AxisLimits
 from acu_daemon.protocol.angles import elevation_code, elevation_deg
 from acu_daemon.sim.autotrack import Autotrack
-from acu_daemon.sim.build import AcuBuild
+from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.pedestal import STEP_S, Axis, Follower
 from acu_daemon.sim.receiver import Offset, Receiver, ReceiverSettings, offset_in_beam
 from acu_daemon.sim.registers import choose_turn
@@ -36,26 +36,26 @@ class Drive(Enum):
 class Antenna:
     """Each 50 Hz step: move_and_sense(), then one of halt(), follow(), track(), coast() and stow()."""
 
-    def __init__(self, build: AcuBuild) -> None:
-        scenario, choice = build.scenario, build.scenario.receiver
-        self.az = Axis(build.azimuth, scenario.acu.azimuth_deg)
-        self.el = Axis(build.elevation, scenario.acu.elevation_deg)
+    def __init__(self, parts: AcuParts) -> None:
+        scenario, choice = parts.scenario, parts.scenario.receiver
+        self.az = Axis(parts.azimuth, scenario.acu.azimuth_deg)
+        self.el = Axis(parts.elevation, scenario.acu.elevation_deg)
         self.tilt = Axis(TILT, 0.0)
         self.receiver = Receiver(
-            ReceiverSettings(build.beamwidth_deg, choice.peak_agc_db, choice.agc_noise_db, choice.tracking_noise_deg),
-            Random(f"{build.seed} receiver"),
+            ReceiverSettings(parts.beamwidth_deg, choice.peak_agc_db, choice.agc_noise_db, choice.tracking_noise_deg),
+            Random(f"{parts.seed} receiver"),
             STEP_S,
         )
         self.direction: Direction | None = None
         self.offset: Offset | None = None
         self.has_signal = False
-        self._sky = build.sky
+        self._sky = parts.sky
         self._encoder = scenario.encoder
-        self._encoder_random = Random(f"{build.seed} encoder")
-        self._losses = [(*loss.window_tai_s(build.start_tai_s), loss) for loss in scenario.losses]
+        self._encoder_random = Random(f"{parts.seed} encoder")
+        self._losses = [(*loss.window_tai_s(parts.start_tai_s), loss) for loss in scenario.losses]
         self._autotrack = Autotrack(self.az, self.el)
-        self._follow_az, self._follow_el = Follower(build.azimuth), Follower(build.elevation)
-        self._middle_az_deg = (build.azimuth.min_deg + build.azimuth.max_deg) / 2.0
+        self._follow_az, self._follow_el = Follower(parts.azimuth), Follower(parts.elevation)
+        self._middle_az_deg = (parts.azimuth.min_deg + parts.azimuth.max_deg) / 2.0
         self._driven_by = Drive.HALT
 
     @property

@@ -1,0 +1,22 @@
+"""SIMULATION: what an ACU is made of."""
+
+from dataclasses import dataclass
+
+from acu_daemon.model import AxisLimits
+from acu_daemon.protocol.sa3842 import DEFAULT_ADDRESS
+from acu_daemon.sim.scenario import Scenario
+from acu_daemon.sim.sky import Sky
+
+
+@dataclass(frozen=True, slots=True)
+class AcuParts:
+    """What a simulated ACU is made of; the limits are angles of the encoder, the simulation begins at start_tai_s."""
+
+    azimuth: AxisLimits
+    elevation: AxisLimits
+    beamwidth_deg: float
+    sky: Sky
+    start_tai_s: float
+    scenario: Scenario = Scenario()
+    seed: int = 0
+    address: int = DEFAULT_ADDRESS
