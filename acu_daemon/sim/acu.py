@@ -219,7 +219,7 @@ class FakeAcu:
             is_elevation_clamped=el.is_clamped,
             is_stow_pin_in=modes.mode is AcuMode.STOWED,
             is_tilt_fitted=has_tilt,
-            is_tilt_moving=tilt.rate_deg_s != 0.0,
+            is_tilt_moving=tilt.is_moving,
             is_at_tilt_upper_limit=has_tilt and tilt.is_at_max,
             is_at_tilt_lower_limit=has_tilt and tilt.is_at_min,
         )
@@ -245,7 +245,7 @@ class FakeAcu:
             antenna.is_sector_high,
             el.is_at_max,
             el.is_at_min,
-            tilt.rate_deg_s != 0.0,
+            tilt.is_moving,
             tilt.is_at_max,
             tilt.is_at_min,
         )

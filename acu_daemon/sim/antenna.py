@@ -136,8 +136,7 @@ class Antenna:
             follow_el.wait()
         self.az.drive_to(follow_az.target_deg, follow_az.rate_deg_s)
         self.el.drive_to(follow_el.target_deg, follow_el.rate_deg_s)
-        if held[2] != self.tilt_code or self.tilt.rate_deg_s:
-            self.tilt.drive_to(elevation_deg(held[2]), 0.0)
+        self.tilt.drive_to(elevation_deg(held[2]), 0.0)
 
     def track(self, lowest_el_deg: float) -> None:
         """Drive by the error signal of the receiver; without a satellite the axes stand."""
@@ -166,4 +165,4 @@ class Antenna:
         el.drive_to(el_deg, 0.0)
         self.tilt.halt()
         gap_deg = max(abs(az.angle_deg - az_deg), abs(el.angle_deg - el_deg))
-        return gap_deg < STOW_BAND_DEG and max(abs(az.rate_deg_s), abs(el.rate_deg_s)) < STOW_BAND_DEG
+        return gap_deg < STOW_BAND_DEG and not az.is_moving and not el.is_moving

@@ -10,6 +10,7 @@ from acu_daemon.model import AxisLimits
 STEP_S = 0.02
 POSITION_GAIN_PER_S = 40.0  # following error 1/40 s x rate where no acceleration limit interferes
 BRAKING_SHARE = 0.85  # of the acceleration limit: a 50 Hz servo sees the end of its way a step late
+STANDING_DEG_S = 1e-3
 END_BAND_DEG = 0.005  # this near to a soft limit counts as at it
 
 
@@ -36,6 +37,10 @@ class Axis:
     def angle_after_deg(self, after_s: float) -> float:
         """Angle a part of a step after the last one."""
         return self.angle_deg + self.rate_deg_s * after_s
+
+    @property
+    def is_moving(self) -> bool:
+        return abs(self.rate_deg_s) > STANDING_DEG_S
 
     @property
     def is_at_max(self) -> bool:
