@@ -1,11 +1,13 @@
 """Options that several commands share, and what they are turned into."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from acu_daemon import PROCESS_START_S
 from acu_daemon.config import SatelliteFile, StationFile, load_satellite, load_station
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.elements_file import LoadedElements, load_elements
@@ -53,11 +55,13 @@ def parse_utc(option: str, text: str) -> float:
 
 def make_clock(at: str | None, at_monotonic_s: float | None) -> SystemClock:
     """The clock in force: the system's, or a rehearsed one."""
+    if at_monotonic_s is not None and not math.isfinite(at_monotonic_s):
+        raise UsageError(f"--at-monotonic {at_monotonic_s}: expected seconds of CLOCK_MONOTONIC")
     if at is None:
         if at_monotonic_s is not None:
             raise UsageError("--at-monotonic needs --at: it says at which instant that time holds")
         return SystemClock()
-    return SystemClock(parse_utc("--at", at), at_monotonic_s)
+    return SystemClock(parse_utc("--at", at), PROCESS_START_S if at_monotonic_s is None else at_monotonic_s)
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 import asyncio
 import ctypes
+import math
 import os
 import time
 from typing import Protocol
@@ -49,8 +50,7 @@ class Timerfd:
             return
         loop = asyncio.get_running_loop()
         woken: asyncio.Future[None] = loop.create_future()
-        seconds = int(monotonic_s)
-        spec = (ctypes.c_long * 4)(0, 0, seconds, int((monotonic_s - seconds) * 1e9))
+        spec = (ctypes.c_long * 4)(0, 0, *divmod(math.ceil(monotonic_s * 1e9), 1_000_000_000))  # never early
         if _LIBC.timerfd_settime(self._fd, _TIMER_ABSOLUTE, ctypes.byref(spec), None) != 0:
             raise OSError(ctypes.get_errno(), "timerfd_settime failed")
         loop.add_reader(self._fd, self._wake, woken)

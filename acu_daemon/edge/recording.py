@@ -1,9 +1,12 @@
 """Readings CSV: written by `run --record`, read by `replay` (design section 8)."""
 
-import csv
+import contextlib
 import math
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
+
+import structlog
 
 from acu_daemon.errors import UsageError
 from acu_daemon.model import Reading
@@ -13,27 +16,42 @@ HEADER = ["utc", "az_deg", "el_deg", "locked"]
 
 
 class RecordingWriter:
-    """Appends readings to a CSV file; every line is complete, and flushed at least once a second."""
+    """Writes readings to a CSV file; every line is complete, and flushed at least once a second.
+
+    A write that fails (a full disk) ends the recording, with a log line, and never the pass.
+    """
 
     def __init__(self, path: Path) -> None:
         try:
             self._file = path.open("w", encoding="ascii", newline="")
         except OSError as error:
             raise UsageError(f"--record {path}: {error.strerror}") from None
-        self._file.write(",".join(HEADER) + "\n")
-        self._last_tai_s = -math.inf
+        self._path = path
+        self._last_us = -math.inf
         self._flushed_tai_s = -math.inf
+        self.has_failed = False
+        self._try(self._file.write, ",".join(HEADER) + "\n")
 
     def add(self, reading: Reading) -> None:
         """Write one reading; a reading not later than the one before is left out, since times must rise."""
-        if reading.tai_s <= self._last_tai_s:
+        time_us = round(reading.tai_s * 1e6)
+        if time_us <= self._last_us:
             return
-        self._last_tai_s = reading.tai_s
+        self._last_us = time_us
         utc = utc_text(reading.tai_s, 6)
-        self._file.write(f"{utc},{reading.az_deg:.5f},{reading.el_deg:.5f},{int(reading.is_locked)}\n")
+        self._try(self._file.write, f"{utc},{reading.az_deg:.5f},{reading.el_deg:.5f},{int(reading.is_locked)}\n")
         if reading.tai_s - self._flushed_tai_s >= 1.0:
             self._flushed_tai_s = reading.tai_s
-            self._file.flush()
+            self._try(self._file.flush)
+
+    def _try(self, action: Callable[..., object], *arguments: str) -> None:
+        if self.has_failed:
+            return
+        try:
+            action(*arguments)
+        except OSError as error:
+            self.has_failed = True
+            structlog.get_logger("record").warning("record.failed", file=str(self._path), reason=error.strerror)
 
     def __enter__(self) -> "RecordingWriter":
         return self
@@ -41,7 +59,9 @@ class RecordingWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._file.close()
+        self._try(self._file.flush)
+        with contextlib.suppress(OSError):  # of a failed recording: what is still buffered cannot be written either
+            self._file.close()
 
 
 def read_readings(path: Path) -> list[tuple[str, Reading | None, float]]:
@@ -50,18 +70,19 @@ def read_readings(path: Path) -> list[tuple[str, Reading | None, float]]:
     Raises: UsageError: names file, line and what was expected.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"--readings {path}: cannot be read: {error}") from None
-    rows = list(csv.reader(text.splitlines()))
-    if not rows or rows[0] != HEADER:
-        raise UsageError(f"{path}, line 1: expected the header {','.join(HEADER)}")
+        header, *lines = path.read_text(encoding="utf-8-sig").split("\n")
+    except OSError as error:
+        raise UsageError(f"--readings {path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise UsageError(f"--readings {path}: byte {error.start}: expected a CSV file in plain text") from None
+    if header.rstrip() != ",".join(HEADER):
+        raise UsageError(f"{path}, line 1: expected the header {','.join(HEADER)}, found {header.rstrip()[:60]!r}")
     result: list[tuple[str, Reading | None, float]] = []
-    for number, row in enumerate(rows[1:], start=2):
-        if not row:
+    for number, line in enumerate(lines, start=2):
+        if not line.strip():
             continue
         try:
-            utc, reading, tai_s = _row(row)
+            utc, reading, tai_s = _row(line.split(","))
         except ValueError as error:
             raise UsageError(f"{path}, line {number}: {error}") from None
         if result and tai_s <= result[-1][2]:

@@ -10,18 +10,25 @@ from acu_daemon.errors import UsageError
 
 def state_directory(asked: Path | None, *, is_rehearsal: bool) -> Path:
     """Make and return the directory; a rehearsal has one of its own beside the real one.  UsageError: it cannot."""
-    if asked is not None:
-        real = asked
-    elif os.environ.get("STATE_DIRECTORY"):
-        real = Path(os.environ["STATE_DIRECTORY"].split(":")[0])
-    else:
-        real = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state") / "acu-daemon"
-    directory = real.with_name(real.name + "-rehearsal") if is_rehearsal else real
+    real = (asked or _default()).resolve()  # so that "." has a name
+    directory = real.parent / f"{real.name}-rehearsal" if is_rehearsal else real
     try:
         directory.mkdir(mode=0o750, parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"state directory {directory}: {error.strerror}; choose another with --state DIR") from None
     return directory
+
+
+def _default() -> Path:
+    if given := os.environ.get("STATE_DIRECTORY"):  # systemd's; several are parted by colons
+        return Path(given.split(":")[0])
+    home = Path(os.environ.get("XDG_STATE_HOME", ""))
+    if not home.is_absolute():  # such a one is to be ignored: XDG Base Directory Specification
+        try:
+            home = Path.home() / ".local" / "state"
+        except RuntimeError:
+            raise UsageError("this user has no home directory for the state; choose one with --state DIR") from None
+    return home / "acu-daemon"
 
 
 SNAPSHOT = "snapshot.json"

@@ -1,0 +1,172 @@
+"""Recorded readings: what is written can be read, and every bad line is told by its number."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acu_daemon.edge.recording import RecordingWriter, read_readings
+from acu_daemon.errors import UsageError
+from acu_daemon.model import Reading
+from acu_daemon.orbit.timescales import tai_from_utc
+
+HEADER = "utc,az_deg,el_deg,locked"
+GOOD = "2018-12-25T01:40:00.000000Z,10.00000,20.00000,1"
+
+
+def file(directory: Path, *lines: str, header: str = HEADER, ends: str = "\n", encoding: str = "ascii") -> Path:
+    path = directory / "readings.csv"
+    path.write_bytes(ends.join([header, *lines, ""]).encode(encoding))
+    return path
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(UsageError) as error:
+        read_readings(path)
+    return str(error.value).removeprefix(f"{path}")
+
+
+times = st.lists(st.integers(1, 10**9), min_size=1, max_size=20).map(
+    lambda steps: [5e8 + sum(steps[: n + 1]) * 1e-6 for n in range(len(steps))]
+)
+
+
+@given(times, st.floats(0, 360, exclude_max=True), st.floats(-90, 180), st.booleans())
+def test_what_is_written_reads_back_to_half_a_microsecond_and_five_decimals(
+    tmp_path_factory: pytest.TempPathFactory, tai_s: list[float], az_deg: float, el_deg: float, is_locked: bool
+) -> None:
+    path = tmp_path_factory.mktemp("recording") / "x.csv"
+    with RecordingWriter(path) as recording:
+        for time in tai_s:
+            recording.add(Reading(time, az_deg, el_deg, is_locked))
+    read = read_readings(path)
+    assert [time for _, _, time in read] == pytest.approx(tai_s, rel=0, abs=0.6e-6)
+    for _, reading, time in read:
+        assert reading is not None
+        assert (reading.tai_s, reading.is_locked) == (time, is_locked)
+        assert abs((reading.az_deg - az_deg + 180.0) % 360.0 - 180.0) <= 0.6e-5
+        assert reading.el_deg == pytest.approx(el_deg, rel=0, abs=0.6e-5)
+
+
+def test_a_recording_has_the_format_of_the_design(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    with RecordingWriter(path) as recording:
+        recording.add(Reading(tai_from_utc("2016-12-31T23:59:60.5Z"), 359.5, 7.0, False))
+        recording.add(Reading(tai_from_utc("2017-01-01T00:00:00Z"), 0.25, 7.000004, True))
+    assert path.read_text() == (
+        f"{HEADER}\n2016-12-31T23:59:60.500000Z,359.50000,7.00000,0\n2017-01-01T00:00:00.000000Z,0.25000,7.00000,1\n"
+    )
+
+
+def test_a_reading_not_later_than_the_one_before_as_written_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    with RecordingWriter(path) as recording:
+        for time in (100.0, 100.0, 99.0, 100.0000002, 100.000001):
+            recording.add(Reading(time, 1.0, 2.0, True))
+    assert len(read_readings(path)) == 2
+
+
+def test_lines_are_in_the_file_at_least_once_a_second_of_readings(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    with RecordingWriter(path) as recording:
+        for tick in range(31):
+            recording.add(Reading(100.0 + 0.1 * tick, 1.0, 2.0, True))
+            assert path.read_text().count("\n") - 1 >= tick - 9
+
+
+def test_a_full_disk_ends_the_recording_and_not_the_pass(capsys: pytest.CaptureFixture[str]) -> None:
+    with RecordingWriter(Path("/dev/full")) as recording:
+        for tick in range(20):
+            recording.add(Reading(100.0 + tick, 1.0, 2.0, True))
+        assert recording.has_failed
+    assert capsys.readouterr().out.count("record.failed") == 1
+
+
+def test_a_recording_that_cannot_be_made_is_wrong_use(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"--record .*: No such file or directory"):
+        RecordingWriter(tmp_path / "no" / "x.csv")
+    with pytest.raises(UsageError, match=r"--record .*: Is a directory"):
+        RecordingWriter(tmp_path)
+
+
+def test_angles_may_be_empty_where_locked_is_0(tmp_path: Path) -> None:
+    [(utc, reading, tai_s)] = read_readings(file(tmp_path, "2018-12-25T01:40:00Z,,,0"))
+    assert (utc, reading, tai_s) == ("2018-12-25T01:40:00Z", None, tai_from_utc("2018-12-25T01:40:00Z"))
+
+
+def test_azimuth_360_is_north(tmp_path: Path) -> None:
+    [(_, reading, _)] = read_readings(file(tmp_path, "2018-12-25T01:40:00Z,360,5,1"))
+    assert reading is not None
+    assert reading.az_deg == 0.0
+
+
+@pytest.mark.parametrize(("ends", "encoding"), [("\r\n", "ascii"), ("\n", "utf-8-sig"), ("\r\n", "utf-8-sig")])
+def test_windows_line_ends_and_a_byte_order_mark_do_not_matter(tmp_path: Path, ends: str, encoding: str) -> None:
+    read = read_readings(file(tmp_path, GOOD, "2018-12-25T01:40:01Z,,,0", ends=ends, encoding=encoding))
+    assert [utc for utc, _, _ in read] == ["2018-12-25T01:40:00.000000Z", "2018-12-25T01:40:01Z"]
+
+
+def test_a_leap_second_rises_like_any_other(tmp_path: Path) -> None:
+    utc = ["2016-12-31T23:59:59Z", "2016-12-31T23:59:60Z", "2016-12-31T23:59:60.9Z", "2017-01-01T00:00:00Z"]
+    read = read_readings(file(tmp_path, *(f"{text},1,2,1" for text in utc)))
+    start = read[0][2]
+    assert [time - start for _, _, time in read] == pytest.approx([0.0, 1.0, 1.9, 2.0])
+
+
+def test_a_file_with_only_its_header_has_no_readings(tmp_path: Path) -> None:
+    assert read_readings(file(tmp_path)) == []
+
+
+@pytest.mark.parametrize("text", ["", "\n", "utc,az_deg,el_deg\n", "utc;az_deg;el_deg;locked\n", f"{GOOD}\n"])
+def test_another_header_is_told(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text(text)
+    assert refusal(path) == f", line 1: expected the header {HEADER}, found {text.strip()[:60]!r}"
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("2018-12-25T01:40:01Z,1,2", "expected 4 fields, found 3"),
+        ("2018-12-25T01:40:01Z,1,2,1,", "expected 4 fields, found 5"),
+        ("2018-12-25T01:40:01,1,2,1", "'2018-12-25T01:40:01': expected UTC as YYYY-MM-DDThh:mm:ss[.fff]Z"),
+        ("2018-12-25T23:59:60Z,1,2,1", "'2018-12-25T23:59:60Z': that day had no leap second"),
+        ("2018-12-25T01:40:01Z,1,2,true", "locked = 'true': expected 0 or 1"),
+        ("2018-12-25T01:40:01Z,1,2,", "locked = '': expected 0 or 1"),
+        ("2018-12-25T01:40:01Z,,2,1", "az_deg = '': expected a number of degrees"),
+        ("2018-12-25T01:40:01Z,1,x,0", "el_deg = 'x': expected a number of degrees"),
+        ("2018-12-25T01:40:01Z,nan,2,1", "az_deg = nan: expected a finite number"),
+        ("2018-12-25T01:40:01Z,1,inf,1", "el_deg = inf: expected a finite number"),
+        ("2018-12-25T01:40:01Z,-1,2,1", "az_deg = -1: expected 0 to 360"),
+        ("2018-12-25T01:40:01Z,1,181,1", "el_deg = 181: expected -90 to 180"),
+        ('2018-12-25T01:40:01Z,"1,2,1', "az_deg = '\"1': expected a number of degrees"),
+        (GOOD, "2018-12-25T01:40:00.000000Z is not later than the line before; times must rise"),
+        ("2018-12-25T01:39:59Z,1,2,1", "2018-12-25T01:39:59Z is not later than the line before; times must rise"),
+        ("2018-12-25T01:40:00Z,,,0", "2018-12-25T01:40:00Z is not later than the line before; times must rise"),
+    ],
+)
+def test_a_bad_line_is_told_by_its_number(tmp_path: Path, line: str, said: str) -> None:
+    later = "2018-12-25T02:00:00Z,1,2,1"
+    assert refusal(file(tmp_path, GOOD, "", line, later)) == f", line 4: {said}"
+
+
+def test_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"^--readings .*: cannot be read: No such file or directory$"):
+        read_readings(tmp_path / "x.csv")
+    with pytest.raises(UsageError, match=r"^--readings .*: cannot be read: Is a directory$"):
+        read_readings(tmp_path)
+    with pytest.raises(UsageError, match=r"byte 0: expected a CSV file in plain text$"):
+        read_readings(file(tmp_path, encoding="utf-16"))
+
+
+@given(st.binary(max_size=300))
+def test_whatever_a_file_holds_it_is_read_or_refused_with_a_line(
+    tmp_path_factory: pytest.TempPathFactory, data: bytes
+) -> None:
+    path = tmp_path_factory.mktemp("noise") / "x.csv"
+    path.write_bytes(f"{HEADER}\n{GOOD}\n".encode() + data)
+    try:
+        assert read_readings(path)
+    except UsageError as error:
+        assert "line " in str(error) or "byte " in str(error)
