@@ -1,50 +1,70 @@
 """The lag from command to encoder, learned per axis while the antenna follows the registers.
 
 Commands stand still between hand-overs, so the servo chases a staircase.  A servo with lag T (first order) that is
-given steps s every period h shows, at the moment phi after a step took effect, an angle g * s short of the newest step,
-where g = exp(-phi/T) / (1 - exp(-h/T)).  g is learned by least squares over the readings of the pass and turned
-back into T, which the aim of the commands then leads (ICD section 6; field lesson: "the antenna always lags").
+given steps s every period h shows, at the moment phi after a step took effect, an angle g * s short of the newest step, where
+g = exp(-phi/T) / (1 - exp(-h/T)).  g is found by least squares over the readings of the pass and turned back into T,
+weighed against what the ICD lets one expect; the aim of the commands then leads by T (ICD section 6; the field's
+complaint: "the antenna always lags").
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cache
 from math import exp
 
 MAX_LAG_S = 0.5
-_PRIOR_STEP_DEG2 = 0.02  # weight of the prior, as the sum of squared steps it is worth: two seconds at 0.3 deg/s
+PRIOR_LAG_S = 0.0125  # half of the greatest following error of ICD section 5
+PRIOR_SIGMA_S = 0.0075
+CODE_SIGMA_DEG = 0.0016  # of rounding an angle to 16 bits: the least noise a reading has
 
 
 @dataclass(frozen=True, slots=True)
 class LagEstimate:
-    """Least squares sums of one axis."""
+    """Least squares sums of one axis: steps s of the command, and how far x the encoder was short of it."""
 
-    sum_step2_deg2: float = 0.0
-    sum_short_step_deg2: float = 0.0
+    count: int = 0
+    sum_ss_deg2: float = 0.0
+    sum_sx_deg2: float = 0.0
+    sum_xx_deg2: float = 0.0
 
     def seen(self, step_deg: float, short_deg: float) -> "LagEstimate":
-        """Add one reading: the newest step of the command, and how far the encoder is short of the command."""
-        if abs(short_deg) > 5.0 * abs(step_deg) + 0.2:  # not a lag: a disturbance, or an encoder fault
+        """Add one reading; what cannot be a lag (a disturbance, an encoder fault) is left out."""
+        if abs(short_deg) > 5.0 * abs(step_deg) + 0.2:
             return self
-        return replace(
-            self,
-            sum_step2_deg2=self.sum_step2_deg2 + step_deg**2,
-            sum_short_step_deg2=self.sum_short_step_deg2 + step_deg * short_deg,
+        return LagEstimate(
+            self.count + 1,
+            self.sum_ss_deg2 + step_deg * step_deg,
+            self.sum_sx_deg2 + step_deg * short_deg,
+            self.sum_xx_deg2 + short_deg * short_deg,
         )
 
-    def lag_s(self, phase_s: float, period_s: float, prior_s: float = 0.0) -> float:
-        """The lag T in seconds, between 0 and MAX_LAG_S; the prior while nothing is learned.
+    def lag_s(self, phase_s: float, period_s: float) -> float:
+        """The most likely lag T, seconds, between 0 and MAX_LAG_S; the prior while nothing is learned.
 
         phase_s: from the moment a command takes effect to the sample of the angles; period_s: between commands.
         """
-        prior_g = _shortfall(prior_s, phase_s, period_s)
-        g = (self.sum_short_step_deg2 + _PRIOR_STEP_DEG2 * prior_g) / (self.sum_step2_deg2 + _PRIOR_STEP_DEG2)
-        low, high = 0.0, MAX_LAG_S
-        for _ in range(30):
-            middle = (low + high) / 2
-            low, high = (middle, high) if _shortfall(middle, phase_s, period_s) < g else (low, middle)
-        return (low + high) / 2
+        if self.sum_ss_deg2 <= 0.0:
+            return PRIOR_LAG_S
+        g = self.sum_sx_deg2 / self.sum_ss_deg2
+        noise_deg2 = max(self.sum_xx_deg2 - g * self.sum_sx_deg2, 0.0) / self.count + CODE_SIGMA_DEG**2
+        weight = self.sum_ss_deg2 / noise_deg2
+
+        def misfit(candidate: tuple[float, float]) -> float:
+            lag_s, shortfall = candidate
+            return weight * (shortfall - g) ** 2 + ((lag_s - PRIOR_LAG_S) / PRIOR_SIGMA_S) ** 2
+
+        return min(_candidates(phase_s, period_s), key=misfit)[0]
+
+
+@cache
+def _candidates(phase_s: float, period_s: float) -> tuple[tuple[float, float], ...]:
+    """Lags to choose from with their g: every 2.5 ms up to 50 ms, then in steps of a twentieth."""
+    lags_s = [0.0025 * k for k in range(21)]
+    while lags_s[-1] < MAX_LAG_S:
+        lags_s.append(min(lags_s[-1] * 1.05, MAX_LAG_S))
+    return tuple((lag_s, _shortfall(lag_s, phase_s, period_s)) for lag_s in lags_s)
 
 
 def _shortfall(lag_s: float, phase_s: float, period_s: float) -> float:
-    if lag_s < 1e-3:
+    if lag_s <= 0.0:
         return 0.0
     return exp(-phase_s / lag_s) / (1.0 - exp(-period_s / lag_s))

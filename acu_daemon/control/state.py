@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from enum import IntEnum
+from math import inf
 from typing import Any
 
 from acu_daemon.control.lag import LagEstimate
@@ -21,7 +22,6 @@ class ControlConfig:
     sample_delay_s: float = 0.010  # start of WRITE AND STATUS to the sample of the angles, ICD section 6
     poll_sample_delay_s: float = 0.010  # the same for STATUS POLL
     effect_delay_s: float = 0.020  # start of a write to the moment the command takes effect, ICD section 6
-    servo_lag_s: float = 0.0125  # prior of the learned lag: half of the ICD's greatest following error
     beamwidth_deg: float = 1.0
     lock_dwell_s: float = 1.0
     min_elevation_deg: float = 5.0
@@ -58,8 +58,8 @@ class Sent:
 class ControlState:
     """The memory of the 10 Hz decision."""
 
-    track: TrackState = TrackState.IDLE
-    entered_tai_s: float = 0.0
+    track: TrackState = TrackState.LINK_LOST
+    entered_tai_s: float = -inf
     stage: Stage = Stage.NEW
     tilt_code: int = 0
     present_deg: tuple[float, float] | None = None  # the first register write of this start, to be read back
@@ -70,7 +70,7 @@ class ControlState:
     el_rate_deg_s: float = 0.0
     acquired_since_tai_s: float | None = None
     has_acquired: bool = False
-    hold_from_tai_s: float = 0.0
+    hold_from_tai_s: float = -inf
     offset_az_deg: float | None = None  # reading minus prediction, smoothed: carries the path before the first fit
     offset_el_deg: float = 0.0
     axis_az: AxisState | None = None  # the last command as position and rate, continuous azimuth
@@ -81,19 +81,15 @@ class ControlState:
     lag_az: LagEstimate = LagEstimate()
     lag_el: LagEstimate = LagEstimate()
     last_extra: Command | None = None
-    extra_after_tai_s: float = 0.0
-    refused_until_tai_s: float = 0.0
+    extra_after_tai_s: float = -inf
+    refused_until_tai_s: float = -inf
     gate_refusal_count: int = 0
     refusal: str = ""  # of the gate, so that only its change is logged
 
     def lag_s(self, config: ControlConfig) -> tuple[float, float]:
         """Learned lag of azimuth and elevation, seconds."""
         phase_s = config.period_s - config.effect_delay_s + config.sample_delay_s
-        prior_s = config.servo_lag_s
-        return (
-            self.lag_az.lag_s(phase_s, config.period_s, prior_s),
-            self.lag_el.lag_s(phase_s, config.period_s, prior_s),
-        )
+        return self.lag_az.lag_s(phase_s, config.period_s), self.lag_el.lag_s(phase_s, config.period_s)
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ class Cause(StrEnum):
     """Why a state changes, in the words an operator reads."""
 
     LINK_SILENT = "no valid reply from the ACU"
-    LINK_BACK = "the ACU answers again"
+    LINK_BACK = "the ACU answers"
     LOCAL_PANEL = "the local panel took control"
     REMOTE_AGAIN = "remote control is back"
     ACU_FAULT = "the ACU reports a fault"

@@ -24,11 +24,13 @@ from acu_daemon.control.state import (
 from acu_daemon.control.states import ACTIVE, HOLDING, TrackState, transition
 from acu_daemon.model import Pointing, Reading
 from acu_daemon.pointing.wrap import encoder_continuous
+from acu_daemon.protocol.angles import LSB_DEG
 from acu_daemon.protocol.messages import Command, Poll, Status, WriteAndPoll
 from acu_daemon.units import wrap_180
 
 OFFSET_GAIN = 0.3  # of the newest reading in the smoothed distance between reading and prediction
 EXTRA_REPEAT_S = 0.3  # a command gets this long to show in the status before it is sent again
+STEADY_SHARE = 0.1  # of a step of the registers: more change than that from one to the next is acceleration
 REFUSED_PAUSE_S = 1.0  # after a NAK: no blind repetition
 
 
@@ -108,11 +110,22 @@ def _learn_lag(state: ControlState, az_deg: float, el_deg: float) -> ControlStat
         return state
     if not (before.is_free and in_force.is_free and newest.is_free):
         return state
+    if not (
+        _is_steady(before.az_deg, in_force.az_deg, newest.az_deg)
+        and _is_steady(before.el_deg, in_force.el_deg, newest.el_deg)
+    ):
+        return state
     return replace(
         state,
         lag_az=state.lag_az.seen(in_force.az_deg - before.az_deg, in_force.az_deg - az_deg),
         lag_el=state.lag_el.seen(in_force.el_deg - before.el_deg, in_force.el_deg - el_deg),
     )
+
+
+def _is_steady(before_deg: float, in_force_deg: float, newest_deg: float) -> bool:
+    """Whether an axis moves at a nearly constant rate, so that what it is short of is lag, not acceleration."""
+    step_deg, next_deg = in_force_deg - before_deg, newest_deg - in_force_deg
+    return abs(next_deg - step_deg) < STEADY_SHARE * abs(step_deg) + 2 * LSB_DEG
 
 
 def _absorb_offset(state: ControlState, sky: Sky, reading: Reading) -> ControlState:

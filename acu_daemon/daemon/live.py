@@ -9,8 +9,8 @@ from acu_daemon.orbit.timescales import utc_text
 EVERY_TICKS = 2
 
 
-def live_text(seen: Snapshot) -> str:
-    """One line for people; what is not known is shown as a dash."""
+def live_text(seen: Snapshot, beam_error_deg: float | None = None) -> str:
+    """One line for people; what is not known is shown as a dash.  A simulation also knows the beam error."""
     mark = " ".join(
         word for word, is_on in (("SIMULATION", seen.is_simulation), ("REHEARSAL", seen.is_rehearsal)) if is_on
     )
@@ -18,7 +18,10 @@ def live_text(seen: Snapshot) -> str:
         antenna = f"az {seen.az_deg:7.2f} el {seen.el_deg:6.2f}"
     else:
         antenna = "az       - el      -"
-    miss = f"miss {seen.miss_deg:5.3f} deg" if seen.miss_deg is not None else "miss     - deg"
+    if beam_error_deg is not None:
+        miss = f"beam error {beam_error_deg:5.3f} deg"
+    else:
+        miss = f"off prediction {seen.miss_deg:5.3f} deg" if seen.miss_deg is not None else "off prediction     - deg"
     if seen.along_s is not None and seen.across_deg is not None:
         side = "late" if seen.along_s >= 0 else "early"
         correction = f"{abs(seen.along_s):5.2f} s {side:5} {seen.across_deg:+6.3f} deg across"
@@ -38,10 +41,10 @@ class LiveLine:
         self._is_drawn = False
         self._skip = 0
 
-    def show(self, seen: Snapshot) -> None:
+    def show(self, seen: Snapshot, beam_error_deg: float | None = None) -> None:
         self._skip = (self._skip + 1) % EVERY_TICKS
         if self._skip == 0:
-            self._stream.write("\r\033[K" + live_text(seen))
+            self._stream.write("\r\033[K" + live_text(seen, beam_error_deg))
             self._stream.flush()
             self._is_drawn = True
 

@@ -113,9 +113,9 @@ def _pass(propagator: Propagator, site: Site, rise_tai_s: float, set_tai_s: floa
     seen = look_at(propagator, times, site)
     top = int(np.argmax(seen.el_deg))
     return Pass(
-        rise_tai_s=rise_tai_s,
+        rise_tai_s=float(rise_tai_s),
         culmination_tai_s=float(times[top]),
-        set_tai_s=set_tai_s,
+        set_tai_s=float(set_tai_s),
         rise_az_deg=float(seen.az_deg[0]),
         culmination_el_deg=float(seen.el_deg[top]),
         culmination_az_deg=float(seen.az_deg[top]),

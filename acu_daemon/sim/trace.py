@@ -1,10 +1,11 @@
 """SIMULATION: what really happened, ten times a second, for reports and tests."""
 
 import csv
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from types import TracebackType
 
+from acu_daemon.errors import UsageError
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.protocol.messages import AcuMode
 
@@ -36,12 +37,28 @@ class TraceRow:
     has_signal: bool  # the satellite transmits and the receiver is connected, wherever the beam points
 
 
-def write_trace(path: Path, rows: Iterable[TraceRow]) -> None:
-    """Write rows as a CSV; angles with five decimals, empty where there is no satellite."""
-    with path.open("w", newline="") as file:
-        lines = csv.writer(file)
-        lines.writerow(HEADER)
-        lines.writerows(map(_cells, rows))
+class TraceWriter:
+    """Writes rows to a CSV as they come; angles with five decimals, empty where there is no satellite."""
+
+    def __init__(self, path: Path) -> None:
+        try:
+            self._file = path.open("w", encoding="ascii", newline="")
+        except OSError as error:
+            raise UsageError(f"--trace {path}: {error.strerror}") from None
+        self._lines = csv.writer(self._file, lineterminator="\n")
+        self._lines.writerow(HEADER)
+
+    def add(self, row: TraceRow) -> None:
+        """Write one row."""
+        self._lines.writerow(_cells(row))
+
+    def __enter__(self) -> "TraceWriter":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._file.close()
 
 
 def _cells(row: TraceRow) -> list[str]:
