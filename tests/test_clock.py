@@ -1,4 +1,4 @@
-"""The real clock: rehearsals, the timerfd, how the system's UTC is followed.  Never early is asserted, lateness is not."""
+"""The real clock: rehearsals, timerfd, how UTC is followed.  Nothing may be early; how late it is depends on the machine."""
 
 import asyncio
 import time

@@ -21,6 +21,7 @@ from acu_daemon.model import Readings
 
 _LENGTH = struct.Struct("<Q")
 NICENESS = 10
+START_S = 20.0  # a child that starts may take this much longer: niced, on a busy machine, it loads numpy first
 
 
 class FitFailedError(AcuDaemonError):
@@ -65,16 +66,18 @@ class ProcessFitRunner:
         """Ask the child.  Raises: FitFailedError, after which the next call starts a new child."""
         if len(request.readings):
             self._given.append(request.readings)
+        is_new = self._child is None or self._child.returncode is not None
+        timeout_s = self._timeout_s + (START_S if is_new else 0.0)
         try:
-            async with asyncio.timeout(self._timeout_s):
-                if self._child is None or self._child.returncode is not None:
+            async with asyncio.timeout(timeout_s):
+                if is_new:
                     await self._start()
                     request = _with_readings(request, self._given)
                 await self._send(request)
                 reply = await self._receive()
         except TimeoutError:
             await self.close()
-            raise FitFailedError(f"the fit process gave no answer within {self._timeout_s:g} s") from None
+            raise FitFailedError(f"the fit process gave no answer within {timeout_s:g} s") from None
         except (OSError, asyncio.IncompleteReadError) as error:
             await self.close()
             raise FitFailedError(f"the fit process died: {error}") from None
