@@ -1,4 +1,4 @@
-"""The real clock: rehearsals, timerfd, how UTC is followed.  Nothing may be early; how late it is depends on the machine."""
+"""The real clock: rehearsals, the timerfd, how UTC is followed.  That nothing is early is asserted; lateness is not."""
 
 import asyncio
 import time
