@@ -1,6 +1,7 @@
 """The links over a real TCP socket and a real pseudo terminal pair; no timing is asserted."""
 
 import asyncio
+import errno
 import os
 import tty
 from collections.abc import Awaitable, Callable
@@ -181,19 +182,27 @@ async def test_a_missing_port_is_named_with_a_hint(tmp_path: Path) -> None:
         await make_link(f"serial://{tmp_path}/ttyUSB9").open()
 
 
-async def test_seven_bits_with_parity_are_asked_of_the_port(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: dict[str, object] = {}
+@pytest.mark.parametrize(("text", "expected"), [("8N1", (8, "N")), ("7E1", (7, "E"))])
+async def test_the_character_format_is_asked_of_the_port(
+    text: str, expected: tuple[int, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[object, ...]] = []
 
-    class Port(serial.Serial):
-        def __init__(self, path: str, baud: int, bytesize: int, parity: str, **others: object) -> None:
-            asked.update(baud=baud, bytesize=bytesize, parity=parity)
-            super().__init__(path, baud, bytesize, parity, **others)
+    def port(path: str, baud: int, bytesize: int, parity: str, **others: object) -> None:
+        asked.append((path, baud, bytesize, parity, others["exclusive"]))
+        raise serial.SerialException(errno.EACCES, "no")
 
-    monkeypatch.setattr("acu_daemon.edge.serial_port.serial.Serial", Port)
-    link = make_link(f"serial://{pty.path}?format=7E1&baud=38400")
-    await link.open()
-    assert asked == {"baud": 38400, "bytesize": 7, "parity": "E"}
-    await link.close()
+    monkeypatch.setattr("acu_daemon.edge.serial_port.serial.Serial", port)
+    with pytest.raises(LinkError, match="dialout"):
+        await make_link(f"serial:///dev/ttyUSB7?format={text}&baud=38400").open()
+    assert asked == [("/dev/ttyUSB7", 38400, *expected, True)]
+
+
+async def test_a_pseudo_terminal_can_be_opened_again_and_again_with_seven_bits(pty: Pty) -> None:
+    link = make_link(f"serial://{pty.path}?format=7E1")
+    for _ in range(3):
+        await link.open()
+        await link.close()
 
 
 @pytest.mark.parametrize(

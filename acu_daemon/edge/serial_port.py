@@ -6,6 +6,7 @@ import errno
 import os
 import termios
 from collections.abc import Callable
+from pathlib import Path
 
 import serial
 
@@ -13,6 +14,7 @@ from acu_daemon.edge.arrivals import Arrivals
 from acu_daemon.errors import LinkError, LinkRefusedError
 
 READ_BYTES = 4096
+PSEUDO_TERMINALS = "/dev/pts"  # they have neither parity nor 7 bits; the frames are 7-bit clean and need neither
 CHARACTER_FORMATS = {"8N1": (serial.EIGHTBITS, serial.PARITY_NONE), "7E1": (serial.SEVENBITS, serial.PARITY_EVEN)}
 
 
@@ -30,7 +32,7 @@ class SerialLink:
 
     async def open(self) -> None:
         """Open the port exclusively.  LinkRefusedError: another program holds it; LinkError: there is no such port."""
-        bytesize, parity = CHARACTER_FORMATS[self._format]
+        bytesize, parity = CHARACTER_FORMATS["8N1" if _is_pseudo_terminal(self._path) else self._format]
         try:
             port = serial.Serial(self._path, self._baud, bytesize, parity, timeout=0, write_timeout=0, exclusive=True)
         except serial.SerialException as error:
@@ -124,3 +126,7 @@ class SerialLink:
         if self._port is None:
             raise LinkError(f"{self.description} is not open")
         return self._port
+
+
+def _is_pseudo_terminal(path: str) -> bool:
+    return Path(path).resolve().is_relative_to(PSEUDO_TERMINALS)
