@@ -225,7 +225,9 @@ def test_a_link_that_is_not_understood_says_what_is_expected(url: str, text: str
 
 def test_the_time_of_a_character_comes_from_the_baud_rate_named_in_the_url() -> None:
     assert make_link("tcp://acu:3842").byte_time_s == 0.0
-    assert make_link("tcp://acu:3842?baud=9600").byte_time_s == pytest.approx(1.0417e-3, abs=1e-7)
+    paced = make_link("tcp://acu:3842?baud=9600")
+    assert paced.byte_time_s == pytest.approx(1.0417e-3, abs=1e-7)
+    assert paced.description == "tcp://acu:3842?baud=9600"
     link = make_link("serial:///dev/ttyS0?baud=19200&format=7E1")
     assert isinstance(link, SerialLink)
     assert link.byte_time_s == pytest.approx(0.52083e-3, abs=1e-8)

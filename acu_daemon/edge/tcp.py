@@ -20,7 +20,8 @@ class TcpLink:
         self._host, self._port = host, port
         self._monotonic = monotonic
         self.byte_time_s = byte_time_s
-        self.description = f"tcp://{f'[{host}]' if ':' in host else host}:{port}"
+        baud = f"?baud={round(10.0 / byte_time_s)}" if byte_time_s else ""
+        self.description = f"tcp://{f'[{host}]' if ':' in host else host}:{port}{baud}"
         self._connection: _Connection | None = None
 
     async def open(self) -> None:

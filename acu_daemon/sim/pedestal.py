@@ -83,9 +83,16 @@ class Axis:
         self._change_rate(0.0)
 
     def _change_rate(self, wanted_deg_s: float) -> None:
-        most = self.limits.max_rate_deg_s
-        wanted_deg_s = min(max(wanted_deg_s, -most), most)
-        self.rate_deg_s += min(max(wanted_deg_s - self.rate_deg_s, -self._step_deg_s), self._step_deg_s)
+        most_deg_s, step_deg_s, rate_deg_s = self.limits.max_rate_deg_s, self._step_deg_s, self.rate_deg_s
+        if wanted_deg_s > most_deg_s:
+            wanted_deg_s = most_deg_s
+        elif wanted_deg_s < -most_deg_s:
+            wanted_deg_s = -most_deg_s
+        if wanted_deg_s > rate_deg_s + step_deg_s:
+            wanted_deg_s = rate_deg_s + step_deg_s
+        elif wanted_deg_s < rate_deg_s - step_deg_s:
+            wanted_deg_s = rate_deg_s - step_deg_s
+        self.rate_deg_s = wanted_deg_s
 
 
 class Follower:
