@@ -10,8 +10,8 @@ from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup, Refit
 from acu_daemon.control.states import TrackState
 from acu_daemon.model import Reading, Readings
 
-BUFFER_S = 2.0  # as much prediction as a line can need: a refit comes at least once a second of data
-REFIT_PERIOD_S = 1.0
+BUFFER_S = 2.0  # after its end, and with new readings, a fresh one is made
+REFIT_PERIOD_S = 0.5  # at any rate of readings, a refit then comes at least once a second of data, or on every line
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,15 +40,17 @@ def replay(
     waiting: list[Reading] = []
     refitted_tai_s = -np.inf
     current: RefitReply | None = None
+    has_acquired = False
     for count, (tai_s, reading) in enumerate(lines):
+        is_acquired = reading is not None and reading.is_locked
+        has_acquired = has_acquired or is_acquired
         is_due = bool(waiting) and waiting[-1].tai_s - refitted_tai_s >= REFIT_PERIOD_S - 1e-6
-        is_dry = current is None or tai_s > current.prediction.end_tai_s
-        is_loss = bool(waiting) and not (reading is not None and reading.is_locked)
-        if is_due or is_dry or is_loss:
+        is_loss = bool(waiting) and not is_acquired
+        if current is None or tai_s > current.prediction.end_tai_s or is_due or is_loss:
             refitted_tai_s = waiting[-1].tai_s if waiting else refitted_tai_s
             current = refitter.refit(_request(waiting, tai_s))
             waiting = []
-        yield _line(current, tai_s, is_locked=reading is not None and reading.is_locked)
+        yield _line(current, tai_s, _state(current.prediction.kind == "FITTED", is_acquired, has_acquired))
         if reading is not None and dwell.is_locked(reading):
             waiting.append(reading)
         if on_progress is not None and count % 100 == 0:
@@ -69,14 +71,22 @@ def _request(waiting: list[Reading], tai_s: float) -> RefitRequest:
     )
 
 
-def _line(reply: RefitReply | None, tai_s: float, *, is_locked: bool) -> Replayed:
-    point = reply.prediction.at(tai_s) if reply else None
-    if reply is None or point is None:
+def _line(reply: RefitReply, tai_s: float, source: TrackState) -> Replayed:
+    prediction = reply.prediction
+    point = prediction.at(tai_s)
+    if point is None:
         raise ValueError("a line outside the buffer made for it")
-    is_fitted = reply.prediction.kind == "FITTED"
-    if is_locked:
-        source = TrackState.AUTOTRACK_FITTED if is_fitted else TrackState.AUTOTRACK_TLE
-    else:
-        source = TrackState.HOLD_FITTED if is_fitted else TrackState.HOLD_TLE
-    sigma = reply.prediction.sigma_deg
-    return Replayed(point.az_deg % 360.0, point.el_deg, None if sigma is None else float(sigma[0]), source)
+    sigma_deg = None
+    if prediction.sigma_deg is not None:
+        index = min(round((tai_s - prediction.start_tai_s) / prediction.step_s), prediction.sigma_deg.size - 1)
+        sigma_deg = float(prediction.sigma_deg[index])
+    return Replayed(point.az_deg % 360.0, point.el_deg, sigma_deg, source)
+
+
+def _state(is_fitted: bool, is_acquired: bool, has_acquired: bool) -> TrackState:
+    """The state in which the daemon would have been, from the signal and the fit."""
+    if is_acquired:
+        return TrackState.AUTOTRACK_FITTED if is_fitted else TrackState.AUTOTRACK_TLE
+    if has_acquired:
+        return TrackState.HOLD_FITTED if is_fitted else TrackState.HOLD_TLE
+    return TrackState.ACQUIRE_TLE
