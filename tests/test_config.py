@@ -13,7 +13,12 @@ from acu_daemon.config_problems import in_words
 from acu_daemon.errors import ConfigError
 from acu_daemon.orbit.timescales import tai_from_utc
 
-SHIPPED = Path(__file__).resolve().parents[1] / "config"
+ROOT = Path(__file__).resolve().parents[1]
+SHIPPED = [
+    (directory, name)
+    for directory in (ROOT / "config", ROOT / "acu_daemon" / "cli" / "demo_config")
+    for name in satellite_names(directory)
+]
 BYTE_9600_S = 10 / 9600
 
 
@@ -24,13 +29,13 @@ def complaint(directory: Path, satellite: str = "scd") -> str:
     return str(error.value).replace(str(directory), "DIR")
 
 
-@pytest.mark.parametrize("name", satellite_names(SHIPPED))
-def test_every_file_that_is_shipped_loads(name: str) -> None:
-    load_satellite(SHIPPED, name, load_station(SHIPPED))
+@pytest.mark.parametrize(("directory", "name"), SHIPPED)
+def test_every_file_that_is_shipped_loads(directory: Path, name: str) -> None:
+    load_satellite(directory, name, load_station(directory))
 
 
-def test_two_satellites_are_shipped() -> None:
-    assert satellite_names(SHIPPED) == ["demo-1", "scd-1"]
+def test_the_example_and_the_demo_are_shipped() -> None:
+    assert [name for _, name in SHIPPED] == ["scd-1", "demo-1"]
 
 
 def test_every_default_is_the_one_of_the_design(tmp_path: Path) -> None:

@@ -1,0 +1,204 @@
+"""The order of a start against a small ACU: nothing is written before the present angles, and those are read back."""
+
+from dataclasses import replace
+
+import pytest
+
+from acu_daemon.control.start import after_reply, next_command
+from acu_daemon.control.state import ControlConfig, ControlState, Exchange, Stage
+from acu_daemon.model import AxisLimits
+from acu_daemon.protocol.angles import LSB_DEG
+from acu_daemon.protocol.messages import (
+    Ack,
+    AcuMode,
+    Command,
+    Identify,
+    Identity,
+    Nak,
+    Parameter,
+    ReadParameter,
+    ReadRegisters,
+    Registers,
+    Reply,
+    Status,
+    WriteParameter,
+    WriteRegisters,
+)
+from acu_daemon.protocol.status_block import decode_status
+
+CONFIG = ControlConfig(AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0))
+AZ_DEG, EL_DEG = 22464 * LSB_DEG, 10322 * LSB_DEG  # angles an encoder can show, near 123.4 and 56.7
+READS = (Identify, ReadRegisters, ReadParameter)
+
+
+class SmallAcu:
+    """Answers what a start asks; refuses or stays silent where the test says."""
+
+    def __init__(self, sector: int = 0, registers: tuple[float, float] = (10.0, 20.0)) -> None:
+        self.sector, self.registers, self.count = sector, registers, 0
+        self.asked: list[Command] = []
+
+    def answer(self, command: Command) -> Reply:
+        self.asked.append(command)
+        match command:
+            case Identify():
+                return Identity("3842", "S2")
+            case ReadRegisters():
+                az_deg, el_deg = (round(angle / LSB_DEG) * LSB_DEG for angle in self.registers)
+                return Registers(az_deg % 360.0, el_deg, 77, self.count)
+            case ReadParameter(name="S"):
+                return Parameter("S", self.sector)
+            case WriteParameter(name="S", code=code):
+                self.sector = code
+                return Ack()
+            case WriteRegisters(az_deg=az_deg, el_deg=el_deg):
+                self.registers, self.count = (az_deg, el_deg), self.count + 1
+                return Ack()
+        return Nak()
+
+
+def status(**changes: object) -> Status:
+    standby = decode_status("0" * 23)
+    return replace(
+        standby,
+        mode=AcuMode.STANDBY,
+        az_deg=AZ_DEG,
+        el_deg=EL_DEG,
+        is_remote_enabled=True,
+        **changes,  # type: ignore[arg-type]
+    )
+
+
+def standing(az_deg: float = AZ_DEG, el_deg: float = EL_DEG, *, is_remote_enabled: bool = True) -> ControlState:
+    seen = replace(status(), az_deg=az_deg % 360.0, el_deg=el_deg, is_remote_enabled=is_remote_enabled)
+    return ControlState(status=seen, az_deg=az_deg)
+
+
+def step(state: ControlState, reply: Reply | None, command: Command) -> ControlState:
+    return replace(after_reply(state, Exchange(command, reply)), last_extra=command)
+
+
+def start(state: ControlState, acu: SmallAcu, config: ControlConfig = CONFIG, limit: int = 20) -> ControlState:
+    """Exchange until the start waits or is done."""
+    for _ in range(limit):
+        command = next_command(state, config)
+        if command is None:
+            return state
+        state = step(state, acu.answer(command), command)
+    return state
+
+
+def test_a_start_polls_identifies_reads_writes_the_present_angles_and_reads_them_back() -> None:
+    acu = SmallAcu()
+    state = start(standing(), acu)
+    assert acu.asked == [
+        *(Identify(), ReadRegisters(), ReadParameter("S")),
+        *(WriteRegisters(AZ_DEG, EL_DEG), ReadRegisters()),
+    ]
+    assert state.stage is Stage.READY
+    assert state.tilt_code == 77
+    assert acu.registers == (AZ_DEG, EL_DEG)
+
+
+def test_a_sector_preference_left_by_somebody_is_freed_first() -> None:
+    acu = SmallAcu(sector=2)
+    assert start(standing(), acu).stage is Stage.READY
+    assert acu.sector == 0
+    assert acu.asked.index(WriteParameter("S", 0)) < acu.asked.index(WriteRegisters(AZ_DEG, EL_DEG))
+
+
+def test_disarmed_it_stops_before_the_first_write() -> None:
+    acu = SmallAcu(sector=2)
+    state = start(standing(), acu, replace(CONFIG, is_armed=False))
+    assert state.stage is Stage.REGISTERS_KNOWN
+    assert all(isinstance(command, READS) for command in acu.asked)
+    assert (acu.count, acu.sector) == (0, 2)
+
+
+def test_under_local_control_it_waits_before_the_first_write() -> None:
+    acu = SmallAcu()
+    state = start(standing(is_remote_enabled=False), acu)
+    assert state.stage is Stage.REGISTERS_KNOWN
+    assert acu.count == 0
+    remote = replace(state, status=status())
+    assert start(remote, acu).stage is Stage.READY
+
+
+def test_without_any_status_nothing_is_written() -> None:
+    acu = SmallAcu()
+    assert start(ControlState(), acu).stage is Stage.REGISTERS_KNOWN
+    assert acu.count == 0
+
+
+@pytest.mark.parametrize(
+    ("standing_deg", "written_deg"), [((300.0, 95.0), (270.0, 90.0)), ((-271.0, -0.5), (-270.0, 0.0))]
+)
+def test_an_antenna_outside_its_limits_is_asked_to_the_limit(
+    standing_deg: tuple[float, float], written_deg: tuple[float, float]
+) -> None:
+    acu = SmallAcu()
+    assert start(standing(*standing_deg), acu).stage is Stage.READY
+    assert acu.registers == pytest.approx(written_deg, abs=LSB_DEG)
+    assert is_inside(*acu.registers)
+
+
+def is_inside(az_deg: float, el_deg: float) -> bool:
+    return (
+        CONFIG.azimuth.min_deg <= az_deg <= CONFIG.azimuth.max_deg
+        and CONFIG.elevation.min_deg <= el_deg <= CONFIG.elevation.max_deg
+    )
+
+
+@pytest.mark.parametrize("az_deg", [0.0, -0.001, 359.999, -179.9, 180.0])
+def test_the_read_back_holds_through_north_and_at_any_turn(az_deg: float) -> None:
+    wide = replace(CONFIG, azimuth=replace(CONFIG.azimuth, min_deg=-400.0, max_deg=400.0))
+    assert start(standing(az_deg), SmallAcu(), wide).stage is Stage.READY
+
+
+def test_registers_that_another_hand_changed_are_written_again() -> None:
+    class Meddled(SmallAcu):
+        def answer(self, command: Command) -> Reply:
+            reply = super().answer(command)
+            if isinstance(command, WriteRegisters) and self.count == 1:
+                self.registers = (0.0, 0.0)
+            return reply
+
+    acu = Meddled()
+    assert start(standing(), acu).stage is Stage.READY
+    assert acu.count == 2
+
+
+@pytest.mark.parametrize("lost", range(5))
+def test_a_lost_reply_at_any_step_only_repeats_that_step(lost: int) -> None:
+    acu = SmallAcu(sector=1 if lost == 3 else 0)
+    state, exchange_count = standing(), 0
+    while (command := next_command(state, CONFIG)) is not None and exchange_count < 20:
+        reply = acu.answer(command)
+        state = step(state, None if exchange_count == lost else reply, command)
+        exchange_count += 1
+    assert state.stage is Stage.READY
+    assert exchange_count <= 8
+    first_write = next(i for i, command in enumerate(acu.asked) if isinstance(command, WriteRegisters))
+    assert all(isinstance(command, (*READS, WriteParameter)) for command in acu.asked[:first_write])
+
+
+def test_a_refused_write_never_counts_as_done() -> None:
+    class Refusing(SmallAcu):
+        def answer(self, command: Command) -> Reply:
+            if isinstance(command, WriteRegisters):
+                self.asked.append(command)
+                return Nak()
+            return super().answer(command)
+
+    assert start(standing(), Refusing()).stage is Stage.SECTOR_FREE
+
+
+def test_a_reply_to_another_question_moves_nothing() -> None:
+    for stage in Stage:
+        state = replace(standing(), stage=stage)
+        assert after_reply(state, Exchange(ReadParameter("A"), Parameter("A", 0))) == state
+        assert after_reply(state, Exchange(Identify(), Nak())) == state
+
+
+def test_when_it_is_ready_it_asks_for_nothing() -> None:
+    assert next_command(replace(standing(), stage=Stage.READY), CONFIG) is None
