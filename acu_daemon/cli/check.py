@@ -15,7 +15,7 @@ from acu_daemon.control.plan import plan_pass
 from acu_daemon.edge.clock import SystemClock, is_clock_synchronised
 from acu_daemon.edge.link import check_rate, make_link
 from acu_daemon.edge.state import SNAPSHOT, state_directory
-from acu_daemon.errors import AcuDaemonError, LinkError, UsageError
+from acu_daemon.errors import AcuDaemonError, LinkError, OrbitError, UsageError
 from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.protocol.exchange import HostExchange
@@ -53,7 +53,7 @@ def command(
     """
     worst = GO
     for finding in [_running(state)] if running else _findings(config, satellite):
-        typer.echo(f"{finding.verdict:6} {finding.what:22} {finding.detail}")
+        typer.echo(f"{finding.verdict:6} {finding.what:22} {'; '.join(finding.detail.splitlines())}")
         if finding.verdict == NO_GO or (finding.verdict == WARN and worst == GO):
             worst = finding.verdict
     typer.echo(f"{worst}: " + {GO: "ready", WARN: "ready, with warnings", NO_GO: "not ready"}[worst])
@@ -115,7 +115,10 @@ def _satellite(config: Path, name: str) -> Iterator[Finding]:
         yield Finding(NO_GO, f"{name}: elements", "; ".join(elements.errors))
         return
     yield Finding(WARN if elements.warnings else GO, f"{name}: elements", "; ".join([*elements.warnings, age]))
-    yield from _next_pass(name, target, now_tai_s)
+    try:
+        yield from _next_pass(name, target, now_tai_s)
+    except OrbitError as error:
+        yield Finding(NO_GO, f"{name}: next pass", str(error))
 
 
 def _next_pass(name: str, target: Target, now_tai_s: float) -> Iterator[Finding]:

@@ -1,6 +1,7 @@
 """`acu-daemon passes`: the coming passes."""
 
 import json
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -8,7 +9,7 @@ import typer
 from acu_daemon.cli.options import Config, load_target, parse_utc
 from acu_daemon.config import satellite_names
 from acu_daemon.edge.clock import SystemClock
-from acu_daemon.errors import UsageError
+from acu_daemon.errors import OrbitError, UsageError
 from acu_daemon.model import Pass
 from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.timescales import utc_text
@@ -35,14 +36,12 @@ def command(
         raise UsageError(f"{config}/satellites holds no satellite; put a NAME.toml there")
     rows: list[tuple[str, Pass]] = []
     for name in names:
-        target = load_target(config, name, start_tai_s, is_strict=False)
-        for text in [*target.elements.errors, *target.elements.warnings]:
-            typer.echo(f"warning: {text}", err=True)
-        lowest_deg = target.station.station.min_elevation_deg
-        found = find_passes(
-            target.elements.propagator, target.station.site, start_tai_s, start_tai_s + days * DAY_S, lowest_deg
-        )
-        rows += [(name, one) for one in found]
+        try:
+            rows += [(name, one) for one in _passes(config, name, start_tai_s, start_tai_s + days * DAY_S)]
+        except OrbitError as error:
+            if satellite is not None:
+                raise
+            typer.echo(f"warning: {name} is left out: {error}", err=True)
     rows.sort(key=lambda row: row[1].rise_tai_s)
     if as_json:
         typer.echo(json.dumps([_as_json(name, one) for name, one in rows], indent=1))
@@ -62,6 +61,14 @@ def command(
         typer.echo(_as_text(name, one))
     if not rows:
         typer.echo(f"no pass within {days:g} days; try --days {min(60, 3 * days):g}")
+
+
+def _passes(config: Path, name: str, start_tai_s: float, end_tai_s: float) -> list[Pass]:
+    target = load_target(config, name, start_tai_s, is_strict=False)
+    for text in [*target.elements.errors, *target.elements.warnings]:
+        typer.echo(f"warning: {text}", err=True)
+    lowest_deg = target.station.station.min_elevation_deg
+    return find_passes(target.elements.propagator, target.station.site, start_tai_s, end_tai_s, lowest_deg)
 
 
 def _as_text(name: str, one: Pass) -> str:

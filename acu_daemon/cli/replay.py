@@ -34,6 +34,8 @@ def command(
 
     Readings: any rate from 0.2 Hz up; `locked` is the raw flag, 0 or 1; angles may be empty where it is 0.
     """
+    if out.exists() and readings.exists() and out.samefile(readings):
+        raise UsageError(f"--out {out} is the recording itself; give the predictions a file of their own")
     lines = read_readings(readings)
     if not lines:
         raise UsageError(f"{readings}: no readings below the header")
@@ -56,10 +58,8 @@ def command(
     )
     rows = ["utc,az_deg,el_deg,sigma_deg,source"]
     rows += [_row(utc, result) for (utc, _, _), result in zip(lines, results, strict=True)]
-    unfinished = out.with_name(out.name + ".part")
     try:
-        unfinished.write_text("\n".join(rows) + "\n", encoding="ascii")
-        unfinished.replace(out)
+        out.write_text("\n".join(rows) + "\n", encoding="ascii")
     except OSError as error:
         raise UsageError(f"--out {out}: {error.strerror}") from None
     if on_progress is not None:

@@ -1,0 +1,287 @@
+"""`acu-daemon check`: a line per check, GO, WARN or NO-GO, against ACUs that answer, stay silent, or are not there."""
+
+import contextlib
+import os
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from command_line import Done, acu_daemon
+from config_files import BROUWER, STATION, from_file, replaced, write
+
+from acu_daemon.cli import check
+from acu_daemon.edge.state import SNAPSHOT
+from acu_daemon.orbit.timescales import tai_from_utc
+from acu_daemon.protocol.messages import (
+    AcuMode,
+    Command,
+    Faults,
+    Identify,
+    Identity,
+    Nak,
+    Poll,
+    ReadFaults,
+    Reply,
+    Status,
+)
+from acu_daemon.protocol.sa3842 import CMD_OF, CommandDecoder, encode_reply
+from acu_daemon.protocol.status_block import decode_status
+
+READY = replace(
+    decode_status("0" * 23), mode=AcuMode.STANDBY, is_remote_enabled=True, is_receiver_valid=True, agc_db=7.5
+)
+PLAIN = Identity("3842", "10")
+
+
+class SmallAcu:
+    """Answers on a TCP port, from a thread; remembers what it was asked."""
+
+    def __init__(self, status: Status | None, identity: Identity, faults: Faults) -> None:
+        self._answers: dict[type, Reply | None] = {Poll: status, Identify: identity, ReadFaults: faults}
+        self.asked: list[Command | None] = []
+        self._server = socket.create_server(("127.0.0.1", 0))
+        self.url = f"tcp://127.0.0.1:{self._server.getsockname()[1]}"
+        self._thread = threading.Thread(target=self._serve)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        with contextlib.suppress(OSError):  # closed
+            while True:
+                connection, _ = self._server.accept()
+                with connection:
+                    self._talk(connection)
+
+    def _talk(self, connection: socket.socket) -> None:
+        decoder = CommandDecoder()
+        while data := connection.recv(100):
+            for event in decoder.feed(data, 0.0):
+                self.asked.append(event.command)
+                reply = self._answers.get(type(event.command), Nak())
+                if reply is not None:
+                    connection.sendall(encode_reply(CMD_OF[type(event.command)], reply))
+
+    def close(self) -> None:
+        self._server.shutdown(socket.SHUT_RDWR)
+        self._server.close()
+        self._thread.join()
+
+
+@contextlib.contextmanager
+def acu(status: Status | None = READY, identity: Identity = PLAIN, faults: Faults | None = None) -> Iterator[SmallAcu]:
+    made = SmallAcu(status, identity, faults or Faults())
+    try:
+        yield made
+    finally:
+        made.close()
+
+
+class SetClock:
+    """Stands at an instant of the test."""
+
+    utc = "1989-02-01T00:00:00Z"
+
+    def tai_s(self) -> float:
+        return tai_from_utc(self.utc)
+
+
+@pytest.fixture(autouse=True)
+def clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A synchronised clock, fourteen hours after the epoch of the elements."""
+    monkeypatch.setattr(check, "is_clock_synchronised", lambda: True)
+    monkeypatch.setattr(check, "SystemClock", SetClock)
+
+
+def station(url: str, more: str = "") -> str:
+    return replaced(STATION, "tcp://127.0.0.1:3842", url) + more
+
+
+def lines(done: Done) -> dict[str, tuple[str, str]]:
+    """Verdict and detail of each line by what was checked."""
+    assert "Traceback" not in done.err
+    *findings, _ = done.out.splitlines()
+    return {line[7:29].rstrip(): (line[:6].rstrip(), line[30:]) for line in findings}
+
+
+def last(done: Done) -> str:
+    return done.out.splitlines()[-1]
+
+
+def test_when_all_is_well_every_line_is_go_and_the_status_0(tmp_path: Path) -> None:
+    with acu() as small:
+        done = acu_daemon("check", "--config", write(tmp_path, station(small.url), scd=BROUWER))
+    found = lines(done)
+    assert [(what, verdict) for what, (verdict, _) in found.items()] == [
+        ("station.toml", "GO"),
+        ("clock", "GO"),
+        ("scd: elements", "GO"),
+        ("scd: next pass", "GO"),
+        ("scd: cable wrap", "GO"),
+        ("line rate", "GO"),
+        ("ACU", "GO"),
+        ("ACU control", "GO"),
+        ("ACU faults", "GO"),
+    ]
+    assert done.code == 0
+    assert last(done) == "GO: ready"
+    assert found["ACU"][1] == "SA-3842 10, STANDBY, az 0.00 el 0.00, AGC 7.5 dB"
+
+
+def test_a_check_asks_and_never_changes_anything(tmp_path: Path) -> None:
+    with acu() as small:
+        acu_daemon("check", "--config", write(tmp_path, station(small.url), scd=BROUWER))
+        assert small.asked == [Poll(), Identify(), ReadFaults()]
+
+
+def test_a_simulated_acu_is_called_a_simulation(tmp_path: Path) -> None:
+    with acu(identity=Identity("3842", "S2")) as small:
+        done = acu_daemon("check", "--config", write(tmp_path, station(small.url), scd=BROUWER))
+    assert "SIMULATION" in lines(done)["ACU"][1]
+
+
+@pytest.mark.parametrize(
+    ("status", "faults", "what", "verdict", "said"),
+    [
+        (replace(READY, is_remote_enabled=False), None, "ACU control", "NO-GO", "switch the ACU to REMOTE"),
+        (replace(READY, mode=AcuMode.MANUAL), None, "ACU control", "NO-GO", "the local panel has control"),
+        (replace(READY, mode=AcuMode.FAULT), None, "ACU faults", "NO-GO", "mode FAULT"),
+        (READY, Faults(azimuth=1), "ACU faults", "NO-GO", "azimuth over-current"),
+        (replace(READY, is_receiver_valid=False), None, "receiver", "WARN", "no AGC, or no demodulator"),
+        (replace(READY, mode=AcuMode.STOWED), None, "stow", "WARN", "STOWED: the daemon leaves it"),
+    ],
+)
+def test_what_the_acu_says_is_judged(
+    tmp_path: Path, status: Status, faults: Faults | None, what: str, verdict: str, said: str
+) -> None:
+    with acu(status, faults=faults) as small:
+        done = acu_daemon("check", "--config", write(tmp_path, station(small.url), scd=BROUWER))
+    assert lines(done)[what][0] == verdict
+    assert said in lines(done)[what][1]
+    assert done.code == (1 if verdict == "NO-GO" else 0)
+    assert last(done) == ("NO-GO: not ready" if verdict == "NO-GO" else "WARN: ready, with warnings")
+
+
+def test_a_port_that_nobody_listens_on_is_no_go(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as unused:
+        url = f"tcp://127.0.0.1:{unused.getsockname()[1]}"
+    done = acu_daemon("check", "--config", write(tmp_path, station(url), scd=BROUWER))
+    assert done.code == 1
+    assert lines(done)["ACU"] == (
+        "NO-GO",
+        f"nobody listens at {url}: check the port, and that the ACU or the simulator is on",
+    )
+
+
+def test_a_line_that_nobody_answers_on_is_no_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(check, "REPLY_S", 0.05)
+    with acu(status=None) as small:
+        done = acu_daemon("check", "--config", write(tmp_path, station(small.url), scd=BROUWER))
+    assert done.code == 1
+    assert lines(done)["ACU"][0] == "NO-GO"
+    assert "no ACU answers: check address and baud rate" in lines(done)["ACU"][1]
+
+
+def test_a_serial_line_too_slow_for_ten_writes_a_second_is_no_go_with_the_arithmetic(tmp_path: Path) -> None:
+    done = acu_daemon("check", "--config", write(tmp_path, station("serial:///dev/none?baud=4800"), scd=BROUWER))
+    assert done.code == 1
+    assert lines(done)["line rate"][0] == "NO-GO"
+    assert "characters of 2.083 ms" in lines(done)["line rate"][1]
+
+
+def test_every_satellite_of_the_directory_is_checked_unless_one_is_named(tmp_path: Path) -> None:
+    with acu() as small:
+        write(
+            tmp_path,
+            station(small.url),
+            good=BROUWER,
+            old=replaced(BROUWER, "1989-01-31", "1988-01-31"),
+            broken="[satellite]\n",
+        )
+        everything = acu_daemon("check", "--config", tmp_path)
+        one = acu_daemon("check", "--config", tmp_path, "--satellite", "good")
+        nobody = acu_daemon("check", "--config", tmp_path, "--satellite", "moon")
+    found = lines(everything)
+    assert everything.code == 1
+    assert found["good: next pass"][0] == "GO"
+    assert found["old: elements"][0] == "NO-GO"
+    assert "days old, the limit is 30 days" in found["old: elements"][1]
+    assert found["broken: files"][0] == "NO-GO"
+    assert found["ACU"][0] == "GO"
+    assert one.code == 0
+    assert not any(what.startswith(("old", "broken")) for what in lines(one))
+    assert nobody.code == 1
+    assert "no such file; satellites in" in lines(nobody)["moon: files"][1]
+
+
+def test_a_finding_with_several_complaints_keeps_to_its_line(tmp_path: Path) -> None:
+    done = acu_daemon("check", "--config", write(tmp_path, "[station]\n[acu]\n"))
+    assert done.code == 1
+    [(verdict, detail)] = lines(done).values()
+    assert verdict == "NO-GO"
+    assert "station.latitude_deg is missing" in detail
+    assert "acu.url is missing" in detail
+
+
+def test_a_satellite_about_to_decay_is_no_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # an object at its last day, from the SGP4 verification set (Vallado et al., AIAA 2006-6753)
+    decaying = (
+        "1 29141U 85108AA  06170.26783845  .99999999  00000-0  13519-0 0   718\n"
+        "2 29141  82.4288 273.4882 0015848 277.2124  83.9133 15.93343074  6828\n"
+    )
+    monkeypatch.setattr(SetClock, "utc", "2006-06-19T06:30:00Z")
+    with acu() as small:
+        limits = "[elements.limits]\nmin_semi_major_axis_km = 6400.0\n"
+        write(tmp_path, station(small.url), gone=from_file("GONE", "tle", "gone.tle") + limits)
+        (tmp_path / "satellites" / "gone.tle").write_text(decaying)
+        done = acu_daemon("check", "--config", tmp_path)
+    assert done.code == 1
+    assert lines(done)["gone: next pass"][0] == "NO-GO"
+    assert "the satellite has decayed" in lines(done)["gone: next pass"][1]
+    assert lines(done)["ACU"][0] == "GO"
+
+
+def test_a_wrap_that_cannot_hold_the_pass_is_a_warning(tmp_path: Path) -> None:
+    with acu() as small:
+        text = replaced(station(small.url), "min_deg = -270.0\nmax_deg = 270.0", "min_deg = 89.0\nmax_deg = 91.0")
+        done = acu_daemon("check", "--config", write(tmp_path, text, scd=BROUWER))
+    assert lines(done)["scd: cable wrap"][0] == "WARN"
+    assert "no turn holds the whole pass" in lines(done)["scd: cable wrap"][1]
+
+
+def test_manual_arming_and_a_free_running_clock_are_warned_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(check, "is_clock_synchronised", lambda: False)
+    with acu() as small:
+        text = station(small.url, '[safety]\narm = "manual"\n')
+        done = acu_daemon("check", "--config", write(tmp_path, text, scd=BROUWER))
+    assert lines(done)["arming"][0] == "WARN"
+    assert lines(done)["clock"][0] == "WARN"
+    assert done.code == 0
+    assert last(done) == "WARN: ready, with warnings"
+
+
+def test_a_directory_without_satellites_or_files_is_no_go(tmp_path: Path) -> None:
+    nothing = acu_daemon("check", "--config", tmp_path)
+    assert nothing.code == 1
+    assert "station.toml: no such file" in lines(nothing)["station.toml"][1]
+    with acu() as small:
+        (tmp_path / "station.toml").write_text(station(small.url))
+        empty = acu_daemon("check", "--config", tmp_path)
+    assert empty.code == 1
+    assert "holds no satellite; put a NAME.toml there" in lines(empty)["satellites"][1]
+
+
+def test_the_health_check_looks_only_whether_the_daemon_ticks(tmp_path: Path) -> None:
+    asked = ("check", "--config", tmp_path / "nowhere", "--running", "--state", tmp_path)
+    none = acu_daemon(*asked)
+    assert none.code == 1
+    assert "no daemon has written it" in lines(none)["running daemon"][1]
+    (tmp_path / SNAPSHOT).write_text("{}")
+    assert acu_daemon(*asked).code == 0
+    long_ago = time.time() - 60.0
+    os.utime(tmp_path / SNAPSHOT, (long_ago, long_ago))
+    stale = acu_daemon(*asked)
+    assert stale.code == 1
+    assert "s ago" in lines(stale)["running daemon"][1]

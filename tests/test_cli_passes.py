@@ -1,0 +1,125 @@
+"""`acu-daemon passes`: the coming passes as a table and as JSON, of one satellite or of all."""
+
+import json
+from pathlib import Path
+
+import pytest
+from command_line import Done, acu_daemon
+from config_files import BROUWER, from_file, replaced, write
+
+from acu_daemon.orbit.timescales import tai_from_utc, utc_text
+
+START = "1989-02-01T00:00:00Z"
+SECOND = replaced(BROUWER, "SCD-1", "SCD-9").replace("raan_deg = 240.14", "raan_deg = 60.0")
+# an object at its last day, from the SGP4 verification set (Vallado et al., AIAA 2006-6753): decays within a day
+DECAYING = """1 29141U 85108AA  06170.26783845  .99999999  00000-0  13519-0 0   718
+2 29141  82.4288 273.4882 0015848 277.2124  83.9133 15.93343074  6828
+"""
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> Path:
+    return write(tmp_path, scd=BROUWER, second=SECOND)
+
+
+def passes(config: Path, *more: object) -> Done:
+    return acu_daemon("passes", "--config", config, "--from", START, *more)
+
+
+def test_json_gives_every_pass_with_rise_culmination_and_set_in_order(config: Path) -> None:
+    done = passes(config, "--satellite", "scd", "--json")
+    assert (done.code, done.err) == (0, "")
+    found = json.loads(done.out)
+    assert len(found) >= 5
+    last = tai_from_utc(START)
+    for one in found:
+        assert one["satellite"] == "scd"
+        rise, top, end = (tai_from_utc(one[f"{key}_utc"]) for key in ("rise", "culmination", "set"))
+        assert last <= rise < top < end
+        assert one["duration_s"] == pytest.approx(end - rise, abs=0.002)
+        assert 5.0 <= one["culmination_el_deg"] <= 90.0
+        assert all(0.0 <= one[f"{key}_az_deg"] < 360.0 for key in ("rise", "culmination", "set"))
+        last = end
+
+
+def test_a_table_has_a_line_a_pass_in_the_order_of_the_rises(config: Path) -> None:
+    done = passes(config)
+    header, *lines = done.out.splitlines()
+    assert done.code == 0
+    assert header.split()[:3] == ["satellite", "rise", "UTC"]
+    found = json.loads(passes(config, "--json").out)
+    assert [line.split()[0] for line in lines] == [one["satellite"] for one in found]
+    assert {one["satellite"] for one in found} == {"scd", "second"}
+    rises = [" ".join(line.split()[1:3]) for line in lines]
+    assert rises == sorted(rises)
+    for line, one in zip(lines, found, strict=True):
+        assert float(line.split()[5]) == pytest.approx(one["culmination_el_deg"], abs=0.051)
+
+
+def test_a_pass_in_progress_at_the_start_is_shown_with_its_true_rise(config: Path) -> None:
+    first = json.loads(passes(config, "--satellite", "scd", "--json").out)[0]
+    middle = acu_daemon(
+        "passes", "--config", config, "--satellite", "scd", "--json", "--from", first["culmination_utc"]
+    )
+    assert json.loads(middle.out)[0]["rise_utc"] == first["rise_utc"]
+
+
+def test_nothing_to_show_is_said_with_what_to_do(config: Path) -> None:
+    first = json.loads(passes(config, "--satellite", "scd", "--json").out)[0]
+    after = utc_text(tai_from_utc(first["set_utc"]) + 60.0)
+    asked = ("passes", "--config", config, "--satellite", "scd", "--from", after, "--days", "0.01")
+    done = acu_daemon(*asked)
+    assert done.code == 0
+    assert "no pass within 0.01 days; try --days 0.03" in done.out
+    assert json.loads(acu_daemon(*asked, "--json").out) == []
+
+
+def test_old_elements_are_warned_of_and_still_shown(config: Path) -> None:
+    done = acu_daemon("passes", "--config", config, "--satellite", "scd", "--from", "1989-04-15T00:00:00Z", "--json")
+    assert done.code == 0
+    assert "days old, the limit is 30 days; fetch newer elements" in done.err
+    assert json.loads(done.out)
+
+
+def test_a_decayed_satellite_hides_no_other_one(tmp_path: Path) -> None:
+    write(tmp_path, gone=from_file("GONE", "tle", "gone.tle"), scd=BROUWER)
+    (tmp_path / "satellites" / "gone.tle").write_text(DECAYING)
+    start = ("--from", "2006-06-19T12:00:00Z")
+    all_of_them = acu_daemon("passes", "--config", tmp_path, *start, "--json")
+    assert all_of_them.code == 0
+    assert "warning: gone is left out: NORAD 29141: no position at " in all_of_them.err
+    assert {one["satellite"] for one in json.loads(all_of_them.out)} == {"scd"}
+    alone = acu_daemon("passes", "--config", tmp_path, *start, "--satellite", "gone")
+    assert alone.code == 1
+    assert "the satellite has decayed" in alone.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--from", "1989-02-01"), "--from '1989-02-01': '1989-02-01': expected UTC as YYYY-MM-DDThh:mm:ss[.fff]Z"),
+        (("--satellite", "moon"), "moon.toml: no such file; satellites in "),
+        (("--days", "0"), "--days"),
+        (("--days", "x"), "--days"),
+    ],
+)
+def test_wrong_use_ends_with_status_2_and_a_reason(config: Path, arguments: tuple[str, ...], said: str) -> None:
+    done = passes(config, *arguments)
+    assert done.code == 2
+    assert said in done.err
+    assert "Traceback" not in done.err
+
+
+def test_a_directory_without_satellites_is_told_what_to_do(tmp_path: Path) -> None:
+    (tmp_path / "satellites").mkdir()
+    done = passes(tmp_path)
+    assert done.code == 2
+    assert "satellites holds no satellite; put a NAME.toml there" in done.err
+
+
+def test_every_line_of_a_complaint_names_the_program(tmp_path: Path) -> None:
+    write(tmp_path, "[station]\n")
+    done = passes(tmp_path, "--satellite", "scd")
+    assert done.code == 2
+    assert len(done.err.splitlines()) >= 2
+    assert all(line.startswith("acu-daemon: ") for line in done.err.splitlines())

@@ -1,0 +1,206 @@
+"""`acu-daemon replay`: the files as the design says, on a real pass, and every wrong use with exit status 2."""
+
+import csv
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import real_passes
+from command_line import Done, acu_daemon
+from config_files import STATION, from_file, replaced, write
+from conftest import DATA, needs_data
+from real_passes import RealPass, noisy, sky_angles_deg
+
+from acu_daemon.assist.estimator import ESTIMATORS
+from acu_daemon.control.states import TrackState
+from acu_daemon.edge.recording import RecordingWriter
+from acu_daemon.model import Reading
+from acu_daemon.orbit.timescales import utc_text
+from acu_daemon.units import DAY_S, Array
+
+PASS = "sentinel-3a-CachoeiraPaulista-20181225T0140"
+HEADER = "utc,az_deg,el_deg,locked"
+NOISE_DEG = 0.03
+
+
+def station_of(real: RealPass) -> str:
+    station = real.site.station
+    text = STATION
+    for old, new in (
+        ("latitude_deg = -15.53", f"latitude_deg = {station.latitude_deg}"),
+        ("longitude_deg = -56.07", f"longitude_deg = {station.longitude_deg}"),
+        ("height_m = 277.0", f"height_m = {float(station.height_m)}"),
+    ):
+        text = replaced(text, old, new)
+    return f"{text}[time]\nut1_utc_s = {real.site.orientation.ut1_utc_s}\n"
+
+
+@pytest.fixture
+def real() -> RealPass:
+    return real_passes.load(PASS)
+
+
+@pytest.fixture
+def config(tmp_path: Path, real: RealPass) -> Path:
+    directory = write(tmp_path / "config", station_of(real), sat=from_file("SENTINEL-3A", "tle", "sat.tle"))
+    (directory / "satellites" / "sat.tle").write_bytes((DATA / "passes" / f"{PASS}.tle").read_bytes())
+    return directory
+
+
+def recorded(
+    path: Path, real: RealPass, step_s: float = 2.0, lost_from: float = 0.6
+) -> tuple[Path, tuple[Array, Array]]:
+    """A recording of the pass, angles empty after the loss; and the true sky."""
+    tai_s = np.arange(real.tai_s[0], real.tai_s[-1], step_s)
+    sky = real.sky(tai_s)
+    seen = noisy(*sky, tai_s, NOISE_DEG, np.random.default_rng(5))
+    rows = [HEADER]
+    for count, (time, az, el) in enumerate(zip(tai_s.tolist(), seen.az_deg, seen.el_deg, strict=True)):
+        is_locked = count < lost_from * tai_s.size
+        rows.append(f"{utc_text(time, 6)},{az:.5f},{el:.5f},1" if is_locked else f"{utc_text(time, 6)},,,0")
+    path.write_text("\n".join(rows) + "\n")
+    return path, sky
+
+
+def replay(config: Path, readings: Path, out: Path, *more: str, satellite: str = "sat") -> Done:
+    return acu_daemon(
+        "replay", "--config", config, "--satellite", satellite, "--readings", readings, "--out", out, *more
+    )
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+@needs_data
+@pytest.mark.parametrize("estimator", [None, *sorted(ESTIMATORS)])
+def test_a_real_pass_is_predicted_through_its_loss_in_the_format_of_the_design(
+    tmp_path: Path, config: Path, real: RealPass, estimator: str | None
+) -> None:
+    readings, sky = recorded(tmp_path / "in.csv", real)
+    out = tmp_path / "out.csv"
+    done = replay(config, readings, out, *(["--estimator", estimator] if estimator else []))
+    assert (done.code, done.out) == (0, "")
+    assert ("kalman runs in its place" in done.err) == (estimator in (None, "full"))
+    text = out.read_bytes()
+    assert text.startswith(b"utc,az_deg,el_deg,sigma_deg,source\n")
+    assert text.endswith(b"\n")
+    assert b"\r" not in text
+    rows = rows_of(out)
+    asked = rows_of(readings)
+    assert [row["utc"] for row in rows] == [row["utc"] for row in asked]
+    for row in rows:
+        assert re.fullmatch(r"\d{1,3}\.\d{5}", row["az_deg"])
+        assert re.fullmatch(r"-?\d{1,2}\.\d{5}", row["el_deg"])
+        assert 0.0 <= float(row["az_deg"]) < 360.0
+        assert row["sigma_deg"] == ""
+        assert row["source"] in list(TrackState)
+    lost = np.array([row["locked"] == "0" for row in asked])
+    az, el = (np.array([float(row[key]) for row in rows]) for key in ("az_deg", "el_deg"))
+    assert sky_angles_deg(az, el, *sky)[lost].max() < 0.1
+    assert {row["source"] for row, is_lost in zip(rows, lost, strict=True) if is_lost} == {"HOLD/FITTED"}
+
+
+@needs_data
+def test_a_second_run_writes_the_same_bytes(tmp_path: Path, config: Path, real: RealPass) -> None:
+    readings, _ = recorded(tmp_path / "in.csv", real, step_s=5.0)
+    for name in ("one", "two"):
+        assert replay(config, readings, tmp_path / name).code == 0
+    assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
+
+
+@needs_data
+def test_windows_files_and_blank_lines_give_the_same_predictions(tmp_path: Path, config: Path, real: RealPass) -> None:
+    readings, _ = recorded(tmp_path / "in.csv", real, step_s=5.0)
+    other = tmp_path / "windows.csv"
+    other.write_bytes(b"\xef\xbb\xbf" + readings.read_bytes().replace(b"\n", b"\r\n") + b"\r\n")
+    replay(config, readings, tmp_path / "one")
+    assert replay(config, other, tmp_path / "two").code == 0
+    assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
+
+
+@needs_data
+def test_what_is_recorded_later_changes_no_earlier_line(tmp_path: Path, config: Path, real: RealPass) -> None:
+    readings, _ = recorded(tmp_path / "in.csv", real, step_s=5.0)
+    lines = readings.read_text().splitlines()
+    cut = len(lines) // 2
+    shifted = [re.sub(r",\d+\.", ",7.", line) if line.endswith("1") else line for line in lines[cut:]]
+    assert shifted != lines[cut:]
+    other = tmp_path / "other.csv"
+    other.write_text("\n".join(lines[:cut] + shifted) + "\n")
+    replay(config, readings, tmp_path / "one")
+    replay(config, other, tmp_path / "two")
+    one, two = ((tmp_path / name).read_text().splitlines() for name in ("one", "two"))
+    assert one[: cut + 1] == two[: cut + 1]
+    assert one != two
+
+
+@needs_data
+def test_what_the_daemon_records_can_be_replayed(tmp_path: Path, config: Path, real: RealPass) -> None:
+    tai_s = np.arange(real.tai_s[0], real.tai_s[60], 0.1)
+    az_deg, el_deg = real.sky(tai_s)
+    path = tmp_path / "recorded.csv"
+    with RecordingWriter(path) as recording:
+        for row in zip(tai_s.tolist(), az_deg.tolist(), el_deg.tolist(), strict=True):
+            recording.add(Reading(*row, is_locked=True))
+    assert replay(config, path, tmp_path / "out.csv").code == 0
+    assert len(rows_of(tmp_path / "out.csv")) == tai_s.size
+
+
+@needs_data
+def test_the_age_of_elements_counts_at_the_recording_and_old_ones_are_refused(
+    tmp_path: Path, config: Path, real: RealPass
+) -> None:
+    path = tmp_path / "in.csv"
+    path.write_text(f"{HEADER}\n{utc_text(float(real.tai_s[0]) + 60 * DAY_S)},,,0\n")
+    done = replay(config, path, tmp_path / "out.csv")
+    assert done.code == 2
+    assert re.search(r"sat\.tle, line 1: .* days old, the limit is 30 days; fetch newer elements", done.err)
+    assert not (tmp_path / "out.csv").exists()
+
+
+@needs_data
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "in.csv, line 1: expected the header utc,az_deg,el_deg,locked, found ''"),
+        (f"{HEADER}\n", "in.csv: no readings below the header"),
+        ("utc,az,el,lock\n", "in.csv, line 1: expected the header"),
+        (
+            f"{HEADER}\n2018-12-25T01:40:00Z,1,2,1\n2018-12-25T01:40:00Z,1,2,1\n",
+            "line 3: 2018-12-25T01:40:00Z is not la",
+        ),
+        (f"{HEADER}\n2018-12-25T01:40:00,1,2,1\n", "line 2: '2018-12-25T01:40:00': expected UTC"),
+    ],
+)
+def test_a_recording_that_cannot_be_used_is_told_by_its_line(
+    tmp_path: Path, config: Path, text: str, said: str
+) -> None:
+    path = tmp_path / "in.csv"
+    path.write_text(text)
+    done = replay(config, path, tmp_path / "out.csv")
+    assert done.code == 2
+    assert said in done.err
+    assert "Traceback" not in done.err
+    assert not (tmp_path / "out.csv").exists()
+
+
+@needs_data
+def test_wrong_use_ends_with_status_2_and_a_reason(tmp_path: Path, config: Path, real: RealPass) -> None:
+    readings, _ = recorded(tmp_path / "in.csv", real, step_s=5.0)
+    before = readings.read_bytes()
+    for done, said in [
+        (replay(config, tmp_path / "none.csv", tmp_path / "o"), "none.csv: cannot be read: No such file or directory"),
+        (replay(config, readings, tmp_path / "no" / "o"), "--out "),
+        (replay(config, readings, tmp_path), "Is a directory"),
+        (replay(config, readings, readings), "is the recording itself"),
+        (replay(config, readings, tmp_path / "o", "--estimator", "best"), "no estimator 'best': expected one of"),
+        (replay(config, readings, tmp_path / "o", satellite="moon"), "no such file; satellites in"),
+        (replay(tmp_path / "nowhere", readings, tmp_path / "o"), "station.toml: no such file"),
+        (acu_daemon("replay", "--config", config), "Missing option"),
+    ]:
+        assert done.code == 2, said
+        assert said in done.err
+    assert readings.read_bytes() == before
