@@ -13,9 +13,14 @@ from acu_daemon.pointing.axis import AxisState, step
 from acu_daemon.protocol.angles import clamp_deg
 
 LIMIT_SLACK_DEG = 0.1  # noise of a reading at a limit is clamped; more than that is refused
-RATE_MARGIN = 0.98  # of the drive's limits: the time between two writes is only nominally the period
+PATH_MARGIN = 0.98  # of the drive's limits, on the path: the time between two writes is only nominally the period
+NEAR_DEG, NEAR_DEG_S = 0.5, 2.0  # nearer than this to the path in angle and rate is on it
+CHASE_RATE_MARGIN = 0.9  # while it chases the path: an antenna that fell behind must be able to catch up,
+CHASE_ACCELERATION_MARGIN = 0.6  # and must meet the path slowly enough for autotrack to take over (decision 0020)
 STRAY_DEG = 0.5  # an antenna this far from the register it is about to follow starts from where it is
-WINDUP_S = 0.6  # a followed register may lead the antenna by this much of its motion, and a little more
+WINDUP_DEG = 10.0  # a followed register may lead the antenna by this, and by WINDUP_S of the motion; then it starts anew
+WINDUP_S = 0.2
+FRESH_S = 1.0  # readings older than this say nothing about the present rate
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,9 +33,11 @@ class Passed:
     refusal: str = ""
 
 
-def gate(wanted: Pointing, state: ControlState, *, is_followed: bool, dt_s: float, config: ControlConfig) -> Passed:
+def gate(
+    wanted: Pointing, state: ControlState, now_tai_s: float, *, is_followed: bool, dt_s: float, config: ControlConfig
+) -> Passed:
     """Let a wanted pointing pass, hold it back, or refuse it.  dt_s: since the last write."""
-    az, el = _from(state, is_followed=is_followed)
+    az, el = _from(state, now_tai_s, is_followed=is_followed)
     refusal = _refusal(wanted, config)
     if refusal:
         return Passed(_legal(replace(az, rate_deg_s=0.0), config.azimuth), _legal(el, config.elevation), True, refusal)
@@ -58,38 +65,55 @@ def _refusal(wanted: Pointing, config: ControlConfig) -> str:
     return ""
 
 
-def _from(state: ControlState, *, is_followed: bool) -> tuple[AxisState, AxisState]:
+def _from(state: ControlState, now_tai_s: float, *, is_followed: bool) -> tuple[AxisState, AxisState]:
     """Where a followed register starts from: the last command, or the antenna when it is not there."""
-    status = state.status
-    el_deg = status.el_deg if status is not None else 0.0
+    az, el = _antenna(state, now_tai_s)
     return (
-        _anchor(state.axis_az, state.az_deg, state.az_rate_deg_s, state, is_followed=is_followed),
-        _anchor(state.axis_el, el_deg, state.el_rate_deg_s, state, is_followed=is_followed),
+        _anchor(state.axis_az, az, begins=is_followed and not state.was_followed, is_followed=is_followed),
+        _anchor(state.axis_el, el, begins=is_followed and not state.was_followed, is_followed=is_followed),
     )
 
 
-def _anchor(
-    last: AxisState | None, encoder_deg: float, rate_deg_s: float, state: ControlState, *, is_followed: bool
-) -> AxisState:
-    here = AxisState(encoder_deg, rate_deg_s)
+def _antenna(state: ControlState, now_tai_s: float) -> tuple[AxisState, AxisState]:
+    """Where the antenna is now and how fast it moves, from the last half second of readings."""
+    if not state.track_of_readings:
+        return AxisState(state.az_deg), AxisState(state.status.el_deg if state.status is not None else 0.0)
+    first, last = state.track_of_readings[0], state.track_of_readings[-1]
+    span_s, age_s = last[0] - first[0], now_tai_s - last[0]
+    if not (0.0 < span_s < FRESH_S and age_s < FRESH_S):
+        return AxisState(last[1]), AxisState(last[2])
+    az_rate, el_rate = (last[1] - first[1]) / span_s, (last[2] - first[2]) / span_s
+    return AxisState(last[1] + az_rate * age_s, az_rate), AxisState(last[2] + el_rate * age_s, el_rate)
+
+
+def _anchor(last: AxisState | None, antenna: AxisState, *, begins: bool, is_followed: bool) -> AxisState:
     if last is None:
-        return AxisState(encoder_deg, 0.0)
-    away_deg = abs(last.position_deg - encoder_deg - 0.2 * last.rate_deg_s)
-    if is_followed and not state.was_followed and away_deg > STRAY_DEG:
-        return here
-    if is_followed and away_deg > 10.0 + WINDUP_S * abs(last.rate_deg_s):
-        return here
+        return replace(antenna, rate_deg_s=0.0)
+    away_deg = abs(last.position_deg - antenna.position_deg)
+    moving_deg = WINDUP_S * max(abs(last.rate_deg_s), abs(antenna.rate_deg_s))
+    if (begins and away_deg > STRAY_DEG + moving_deg) or (is_followed and away_deg > WINDUP_DEG + moving_deg):
+        return antenna
     return last
 
 
 def _reachable(start: AxisState, wanted: AxisState, dt_s: float, limits: AxisLimits) -> AxisState:
-    safe = replace(
+    """On the path: all that the drive can do.  Off it: a chase that the antenna can follow easily."""
+    on_path = _share(limits, PATH_MARGIN, PATH_MARGIN)
+    reached = step(start, wanted.position_deg, wanted.rate_deg_s, dt_s, on_path)
+    is_near = abs(reached.position_deg - wanted.position_deg) < NEAR_DEG
+    if is_near and abs(reached.rate_deg_s - wanted.rate_deg_s) < NEAR_DEG_S:
+        return reached
+    chase = _share(limits, CHASE_RATE_MARGIN, CHASE_ACCELERATION_MARGIN)
+    bounded = replace(start, rate_deg_s=min(max(start.rate_deg_s, -chase.max_rate_deg_s), chase.max_rate_deg_s))
+    return step(bounded, wanted.position_deg, wanted.rate_deg_s, dt_s, chase)
+
+
+def _share(limits: AxisLimits, rate: float, acceleration: float) -> AxisLimits:
+    return replace(
         limits,
-        max_rate_deg_s=limits.max_rate_deg_s * RATE_MARGIN,
-        max_acceleration_deg_s2=limits.max_acceleration_deg_s2 * RATE_MARGIN,
+        max_rate_deg_s=limits.max_rate_deg_s * rate,
+        max_acceleration_deg_s2=limits.max_acceleration_deg_s2 * acceleration,
     )
-    bounded = replace(start, rate_deg_s=min(max(start.rate_deg_s, -safe.max_rate_deg_s), safe.max_rate_deg_s))
-    return step(bounded, wanted.position_deg, wanted.rate_deg_s, dt_s, safe)
 
 
 def _legal(axis: AxisState, limits: AxisLimits) -> AxisState:

@@ -51,7 +51,7 @@ class Sent:
 
     az_deg: float
     el_deg: float
-    is_free: bool  # followed by the antenna, and not held back by the drive's limits
+    is_free: bool  # followed, well within what the drive can do, and not held back by the gate
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,8 +66,7 @@ class ControlState:
     status: Status | None = None
     reading: Reading | None = None
     az_deg: float = 0.0  # encoder azimuth of the newest status, in the frame of the wrap (continuous)
-    az_rate_deg_s: float = 0.0  # of the encoders, between the two newest readings
-    el_rate_deg_s: float = 0.0
+    track_of_readings: tuple[tuple[float, float, float], ...] = ()  # the newest: time, continuous azimuth, elevation
     acquired_since_tai_s: float | None = None
     has_acquired: bool = False
     hold_from_tai_s: float = -inf

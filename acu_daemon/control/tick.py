@@ -29,7 +29,9 @@ from acu_daemon.protocol.messages import Command, Poll, Status, WriteAndPoll
 from acu_daemon.units import wrap_180
 
 OFFSET_GAIN = 0.3  # of the newest reading in the smoothed distance between reading and prediction
+RATE_READINGS = 6  # the rate of an axis is taken over this many readings: near the zenith one pair is all noise
 EXTRA_REPEAT_S = 0.3  # a command gets this long to show in the status before it is sent again
+CALM_SHARE = 0.25  # of the drive's rate: above it a lag is what the drive cannot do, not what it does late
 STEADY_SHARE = 0.1  # of a step of the registers: more change than that from one to the next is acceleration
 REFUSED_PAUSE_S = 1.0  # after a NAK: no blind repetition
 
@@ -81,12 +83,6 @@ def _absorb(
 
 def _absorb_reading(state: ControlState, status: Status, reading: Reading, config: ControlConfig) -> ControlState:
     az_deg = encoder_continuous(status.az_deg, status.is_sector_high, config.azimuth)
-    az_rate, el_rate = 0.0, 0.0
-    if state.status is not None and state.reading is not None:
-        dt_s = reading.tai_s - state.reading.tai_s
-        if 0.02 < dt_s < 1.0:
-            az_rate = (az_deg - state.az_deg) / dt_s
-            el_rate = (status.el_deg - state.status.el_deg) / dt_s
     since = (state.acquired_since_tai_s or reading.tai_s) if is_acquired(status) else None
     state = _learn_lag(state, az_deg, status.el_deg)
     return replace(
@@ -94,8 +90,7 @@ def _absorb_reading(state: ControlState, status: Status, reading: Reading, confi
         status=status,
         reading=reading,
         az_deg=az_deg,
-        az_rate_deg_s=az_rate,
-        el_rate_deg_s=el_rate,
+        track_of_readings=(*state.track_of_readings[1 - RATE_READINGS :], (reading.tai_s, az_deg, status.el_deg)),
         acquired_since_tai_s=since,
         has_acquired=state.has_acquired or since is not None,
     )
@@ -208,19 +203,24 @@ def _write(
     wanted = _wanted(state, sky, now_tai_s, config, is_followed=is_followed)
     dt_s = now_tai_s - state.last_write_tai_s if state.last_write_tai_s is not None else config.period_s
     dt_s = min(max(dt_s, config.period_s / 2), 3 * config.period_s)
-    passed = gate(wanted, state, is_followed=is_followed, dt_s=dt_s, config=config)
+    passed = gate(wanted, state, now_tai_s, is_followed=is_followed, dt_s=dt_s, config=config)
     if passed.refusal != state.refusal:
         if passed.refusal:
             events.append(Event("gate.refused", {"reason": passed.refusal, "state": str(state.track)}, is_warning=True))
         state = replace(state, refusal=passed.refusal)
-    return _sent(state, passed, now_tai_s, is_followed=is_followed)
+    return _sent(state, passed, now_tai_s, config, is_followed=is_followed)
 
 
 def _sent(
-    state: ControlState, passed: Passed, now_tai_s: float, *, is_followed: bool
+    state: ControlState, passed: Passed, now_tai_s: float, config: ControlConfig, *, is_followed: bool
 ) -> tuple[ControlState, WriteAndPoll]:
     az_deg, el_deg = passed.az.position_deg, passed.el.position_deg
-    sent = Sent(az_deg, el_deg, is_free=is_followed and state.was_followed and not passed.is_held_back)
+    is_calm = (
+        abs(passed.az.rate_deg_s) < CALM_SHARE * config.azimuth.max_rate_deg_s
+        and abs(passed.el.rate_deg_s) < CALM_SHARE * config.elevation.max_rate_deg_s
+    )
+    is_free = is_calm and is_followed and state.was_followed and not passed.is_held_back
+    sent = Sent(az_deg, el_deg, is_free)
     state = replace(
         state,
         axis_az=passed.az,
