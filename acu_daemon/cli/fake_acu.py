@@ -18,6 +18,7 @@ from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.build import build_fake_acu
 from acu_daemon.sim.server import keep_time, serve_pty, serve_tcp
 from acu_daemon.sim.trace import TraceWriter
+from acu_daemon.sim.wire_log import WireLogWriter
 
 
 def command(
@@ -49,6 +50,10 @@ def command(
         Path | None,
         typer.Option("--trace", metavar="FILE", help="Write what really happens as CSV, ten lines a second."),
     ] = None,
+    wire_log: Annotated[
+        Path | None,
+        typer.Option("--wire-log", metavar="FILE", help="Write every register write that was accepted as CSV."),
+    ] = None,
 ) -> None:
     """SIMULATION: a Scientific-Atlanta 3842 with pedestal, receiver and sky, for rehearsals and tests.
 
@@ -77,8 +82,11 @@ def command(
     )
     typer.echo(f"SIMULATION of an SA-3842 for {target.elements.label} over {station.station.name}", err=True)
     url = station.acu.url
-    with TraceWriter(trace) if trace is not None else contextlib.nullcontext() as writer:
-        acu.observer = writer.add if writer is not None else None
+    with contextlib.ExitStack() as files:
+        if trace is not None:
+            acu.observer = files.enter_context(TraceWriter(trace)).add
+        if wire_log is not None:
+            acu.on_write = files.enter_context(WireLogWriter(wire_log)).add
         asyncio.run(_serve(acu, clock, *_where(listen, pty, url)))
 
 

@@ -14,6 +14,7 @@ from typing import Annotated, Any
 import structlog
 import typer
 
+from acu_daemon import PROCESS_START_S
 from acu_daemon.cli.options import At, AtMonotonic, Config, Satellite, Target, coming_pass, load_target, make_clock
 from acu_daemon.config import control_config, estimator_settings
 from acu_daemon.control.refit import RefitSetup
@@ -29,8 +30,6 @@ from acu_daemon.edge.state import SnapshotFile, state_directory
 from acu_daemon.model import Pass
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.protocol.sa3842 import address_byte
-
-PROCESS_START_S = time.monotonic()
 
 
 def command(

@@ -1,0 +1,135 @@
+"""SIMULATION: a whole pass in virtual time: the real daemon against the fake ACU, minutes in seconds, bit for bit."""
+
+import asyncio
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import structlog
+
+from acu_daemon.cli.options import Target, coming_pass
+from acu_daemon.cli.run import make_job
+from acu_daemon.daemon.area import Snapshot
+from acu_daemon.daemon.service import Outcome, Service
+from acu_daemon.edge.clock import LoopClock
+from acu_daemon.edge.fit import InlineFitRunner
+from acu_daemon.protocol.messages import Command
+from acu_daemon.protocol.sa3842 import CommandDecoder, address_byte
+from acu_daemon.sim.acu import FakeAcu
+from acu_daemon.sim.memory import MemoryLink
+from acu_daemon.sim.parts import AcuParts
+from acu_daemon.sim.scenario import Scenario
+from acu_daemon.sim.sky import Sky, read_truth
+from acu_daemon.sim.trace import TraceRow
+from acu_daemon.sim.virtual import run_virtual
+
+
+@dataclass
+class Flight:
+    """What a virtual pass left behind."""
+
+    rows: list[TraceRow] = field(default_factory=list)  # what really happened, ten a second
+    snapshots: list[Snapshot] = field(default_factory=list)
+    commands: list[tuple[float, Command]] = field(default_factory=list)  # start of the write, TAI, and the command
+    events: list[dict[str, Any]] = field(default_factory=list)  # the log
+    outcome: Outcome | None = None
+
+    def states(self) -> list[str]:
+        """The states of the daemon in their order."""
+        return [str(event["state"]) for event in self.events if event["event"] == "state.changed"]
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """What a script can reach."""
+
+    acu: FakeAcu
+    link: MemoryLink
+    clock: LoopClock
+    service: Service
+
+
+Action = Callable[[Stage], None]
+
+
+class _TappedLink(MemoryLink):
+    """A memory link that notes every command."""
+
+    def __init__(self, acu: FakeAcu, clock: LoopClock, byte_time_s: float, address: int, flight: Flight) -> None:
+        super().__init__(acu, clock, byte_time_s)
+        self._tap = CommandDecoder(address, math.inf)
+        self._tap_clock = clock
+        self._flight = flight
+
+    def write(self, data: bytes) -> None:
+        now_tai_s = self._tap_clock.tai_s()
+        for event in self._tap.feed(data, now_tai_s):
+            if event.command is not None:
+                self._flight.commands.append((now_tai_s, event.command))
+        super().write(data)
+
+
+def fly(
+    target: Target,
+    sky: Sky | Path,
+    scenario: Scenario,
+    *,
+    begin_tai_s: float,
+    end_tai_s: float,
+    seed: int = 1,
+    byte_time_s: float = 0.0,
+    script: Sequence[tuple[float, Action]] = (),
+) -> Flight:
+    """Run the daemon on a pass in virtual time.
+
+    sky: a Sky, or a truth CSV.  script: what happens to the ACU and the link, each at its TAI, such as a power cycle.
+    """
+    flight = Flight()
+    truth = read_truth(sky) if isinstance(sky, Path) else sky
+
+    async def main() -> None:
+        clock = LoopClock(begin_tai_s)
+        acu_section = target.station.acu
+        parts = AcuParts(
+            acu_section.azimuth.limits(),
+            acu_section.elevation.limits(),
+            target.station.receiver.beamwidth_deg,
+            truth,
+            begin_tai_s,
+            scenario,
+            seed,
+            address_byte(acu_section.address),
+        )
+        acu = FakeAcu(parts)
+        acu.observer = flight.rows.append
+        link = _TappedLink(acu, clock, byte_time_s, parts.address, flight)
+        job = make_job(target, coming_pass(target, begin_tai_s), link, is_rehearsal=True, end_tai_s=end_tai_s)
+        service = Service(job, link, clock, InlineFitRunner(job.refit), on_snapshot=flight.snapshots.append)
+        loop = asyncio.get_running_loop()
+        for tai_s, action in script:
+            loop.call_later(tai_s - begin_tai_s, action, Stage(acu, link, clock, service))
+        flight.outcome = await service.run()
+        acu.advance(clock.tai_s())
+
+    with _events_to(flight.events):
+        run_virtual(main())
+    return flight
+
+
+@contextmanager
+def _events_to(events: list[dict[str, Any]]) -> Iterator[None]:
+    """Gather the log in place of printing it."""
+    before = structlog.get_config()
+
+    def gather(_logger: Any, _name: str, entry: Any) -> Any:
+        events.append(dict(entry))
+        raise structlog.DropEvent
+
+    structlog.configure(processors=[gather], cache_logger_on_first_use=False)
+    try:
+        yield
+    finally:
+        structlog.configure(**before)
