@@ -15,7 +15,6 @@ from acu_daemon.protocol.messages import AcuMode, Status
 
 CONFIG = ControlConfig(AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0))
 DT_S = 0.1
-NOW_TAI_S = 0.0
 RATE_TOLERANCE_DEG = 0.006  # one 16-bit code
 
 any_angle = st.floats(allow_nan=True, allow_infinity=True) | st.floats(-400, 400)
@@ -33,7 +32,9 @@ def at(az_deg: float, el_deg: float, az_rate: float = 0.0, el_rate: float = 0.0)
 
 @given(any_angle, any_angle, any_angle, any_angle, st.booleans())
 def test_what_passes_is_always_finite_and_within_the_limits(az, el, az_rate, el_rate, is_followed):
-    passed = gate(Pointing(az, el, az_rate, el_rate), at(100.0, 45.0), NOW_TAI_S, is_followed=is_followed, dt_s=DT_S, config=CONFIG)
+    passed = gate(
+        Pointing(az, el, az_rate, el_rate), at(100.0, 45.0), 0.0, is_followed=is_followed, dt_s=DT_S, config=CONFIG
+    )
     assert -270.0 <= passed.az.position_deg <= 270.0
     assert 0.0 <= passed.el.position_deg <= 90.0
 
@@ -42,7 +43,7 @@ def test_what_passes_is_always_finite_and_within_the_limits(az, el, az_rate, el_
 def test_followed_registers_never_move_faster_than_the_axis(az, el, targets):
     state = at(az, el)
     for target_az, target_el in targets:
-        passed = gate(Pointing(target_az, target_el, 0.0, 0.0), state, NOW_TAI_S, is_followed=True, dt_s=DT_S, config=CONFIG)
+        passed = gate(Pointing(target_az, target_el, 0.0, 0.0), state, 0.0, is_followed=True, dt_s=DT_S, config=CONFIG)
         before_az, before_el = state.axis_az.position_deg, state.axis_el.position_deg
         assert abs(passed.az.position_deg - before_az) <= 20.0 * DT_S + RATE_TOLERANCE_DEG
         assert abs(passed.el.position_deg - before_el) <= 5.0 * DT_S + RATE_TOLERANCE_DEG
@@ -50,32 +51,32 @@ def test_followed_registers_never_move_faster_than_the_axis(az, el, targets):
 
 
 def test_registers_that_are_not_followed_hold_the_true_path_at_any_speed():
-    passed = gate(Pointing(-80.0, 89.9, 170.0, 0.0), at(100.0, 89.8), NOW_TAI_S, is_followed=False, dt_s=DT_S, config=CONFIG)
+    passed = gate(Pointing(-80.0, 89.9, 170.0, 0.0), at(100.0, 89.8), 0.0, is_followed=False, dt_s=DT_S, config=CONFIG)
     assert passed.az.position_deg == pytest.approx(-80.0, abs=RATE_TOLERANCE_DEG)
     assert not passed.is_held_back
 
 
 @pytest.mark.parametrize("bad", [nan, inf, -inf, 270.0 + 2 * LIMIT_SLACK_DEG])
 def test_a_bad_azimuth_is_refused_with_a_reason_and_the_last_good_value_stays(bad):
-    passed = gate(Pointing(bad, 45.0, 0.0, 0.0), at(100.0, 45.0), NOW_TAI_S, is_followed=False, dt_s=DT_S, config=CONFIG)
+    passed = gate(Pointing(bad, 45.0, 0.0, 0.0), at(100.0, 45.0), 0.0, is_followed=False, dt_s=DT_S, config=CONFIG)
     assert passed.refusal
     assert passed.az.position_deg == pytest.approx(100.0, abs=RATE_TOLERANCE_DEG)
 
 
 def test_a_hair_below_the_horizon_is_sent_as_the_limit_not_as_359_999():
-    passed = gate(Pointing(0.0, -0.001, 0.0, 0.0), at(0.0, 0.0), NOW_TAI_S, is_followed=False, dt_s=DT_S, config=CONFIG)
+    passed = gate(Pointing(0.0, -0.001, 0.0, 0.0), at(0.0, 0.0), 0.0, is_followed=False, dt_s=DT_S, config=CONFIG)
     assert passed.el.position_deg == 0.0
     assert not passed.refusal
 
 
 def test_an_antenna_far_from_the_register_it_begins_to_follow_starts_from_where_it_is():
     state = replace(at(100.0, 80.0), axis_az=AxisState(200.0), was_followed=False)
-    passed = gate(Pointing(200.0, 80.0, 0.0, 0.0), state, NOW_TAI_S, is_followed=True, dt_s=DT_S, config=CONFIG)
+    passed = gate(Pointing(200.0, 80.0, 0.0, 0.0), state, 0.0, is_followed=True, dt_s=DT_S, config=CONFIG)
     assert abs(passed.az.position_deg - 100.0) < 1.0
 
 
 def test_a_path_the_axis_can_follow_passes_unchanged():
     state = at(100.0, 45.0, az_rate=0.5, el_rate=0.3)
-    passed = gate(Pointing(100.05, 45.03, 0.5, 0.3), state, NOW_TAI_S, is_followed=True, dt_s=DT_S, config=CONFIG)
+    passed = gate(Pointing(100.05, 45.03, 0.5, 0.3), state, 0.0, is_followed=True, dt_s=DT_S, config=CONFIG)
     assert not passed.is_held_back
     assert passed.az.position_deg == pytest.approx(100.05, abs=RATE_TOLERANCE_DEG / 2)

@@ -18,7 +18,7 @@ NEAR_DEG, NEAR_DEG_S = 0.5, 2.0  # nearer than this to the path in angle and rat
 CHASE_RATE_MARGIN = 0.9  # while it chases the path: an antenna that fell behind must be able to catch up,
 CHASE_ACCELERATION_MARGIN = 0.6  # and must meet the path slowly enough for autotrack to take over (decision 0020)
 STRAY_DEG = 0.5  # an antenna this far from the register it is about to follow starts from where it is
-WINDUP_DEG = 10.0  # a followed register may lead the antenna by this, and by WINDUP_S of the motion; then it starts anew
+WINDUP_DEG = 10.0  # a followed register may lead the antenna by this and WINDUP_S of the motion, else starts anew
 WINDUP_S = 0.2
 FRESH_S = 1.0  # readings older than this say nothing about the present rate
 

@@ -1,10 +1,10 @@
 """The lag from command to encoder, learned per axis while the antenna follows the registers.
 
 Commands stand still between hand-overs, so the servo chases a staircase.  A servo with lag T (first order) that is
-given steps s every period h shows, at the moment phi after a step took effect, an angle g * s short of the newest step, where
-g = exp(-phi/T) / (1 - exp(-h/T)).  g is found by least squares over the readings of the pass and turned back into T,
-weighed against what the ICD lets one expect; the aim of the commands then leads by T (ICD section 6; the field's
-complaint: "the antenna always lags").
+given steps s every period h shows, at the moment phi after a step took effect, an angle g * s short of the newest
+step, where g = exp(-phi/T) / (1 - exp(-h/T)).  g is found by least squares over the readings of the pass and turned
+back into T, weighed against what the ICD lets one expect; the aim of the commands then leads by T (ICD section 6; the
+field's complaint: "the antenna always lags").
 """
 
 from dataclasses import dataclass
