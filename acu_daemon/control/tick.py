@@ -21,7 +21,7 @@ from acu_daemon.control.state import (
     Sky,
     Stage,
 )
-from acu_daemon.control.states import ACTIVE, HOLDING, TrackState, transition
+from acu_daemon.control.states import ACTIVE, AUTOTRACKING, HOLDING, TrackState, transition
 from acu_daemon.model import Pointing, Reading
 from acu_daemon.pointing.wrap import encoder_continuous
 from acu_daemon.protocol.angles import LSB_DEG
@@ -250,8 +250,8 @@ def _wanted(state: ControlState, sky: Sky, now_tai_s: float, config: ControlConf
 def _point(
     state: ControlState, sky: Sky, aim_tai_s: float, config: ControlConfig, *, is_followed: bool
 ) -> Pointing | None:
-    if state.track not in ACTIVE:
-        return None
+    if state.track not in ACTIVE or (not is_followed and state.track not in AUTOTRACKING):
+        return None  # a mode that follows the registers must find them where the antenna is, not where it shall go
     if state.track is TrackState.SEARCH and sky.prediction is not None:
         offset = search_offset(
             aim_tai_s - state.entered_tai_s, config.search_s, config.search_along_s, config.search_across_deg
