@@ -74,7 +74,10 @@ def _absorb(
         state = after_reply(state, seen.extra)
     if seen.refused is not None:
         state = replace(state, refused_until_tai_s=now_tai_s + REFUSED_PAUSE_S)
-        events.append(Event("acu.refused_write", {"command": str(state.commands[-1:])}, is_warning=True))
+        sent = state.commands[-1] if state.commands else None
+        events.append(
+            Event("acu.refused_write", {"az_deg": sent.az_deg, "el_deg": sent.el_deg} if sent else {}, is_warning=True)
+        )
     if seen.status is not None and seen.reading is not None:
         state = _absorb_reading(state, seen.status, seen.reading, config)
         state = _absorb_offset(state, sky, seen.reading)

@@ -31,6 +31,7 @@ from acu_daemon.protocol.messages import (
     WriteAndPoll,
     WriteParameter,
     WriteRegisters,
+    command_text,
 )
 
 CLOCK_STEP_S = 0.1
@@ -125,7 +126,7 @@ class Foreground:
                 await self._poll_after_nak(command)
 
     async def _poll_after_nak(self, refused: Command) -> None:
-        self._log.warning("acu.nak", command=str(refused))
+        self._log.warning("acu.nak", command=command_text(refused))
         await self._port.idle_gap()
         answer = await self._port.exchange(Poll())
         if isinstance(answer.reply, Status):
@@ -159,7 +160,7 @@ class Foreground:
         elif isinstance(command, SelectMode | SelectBackup | WriteParameter | WriteRegisters) and isinstance(
             answer.reply, Ack
         ):
-            self._log.info("acu.command", command=str(command))
+            self._log.info("acu.command", command=command_text(command))
 
     def _watch_clock(self) -> None:
         """Follow the system clock slowly; a step is reported once and not obeyed."""

@@ -4,7 +4,7 @@ Angles are degrees in the encoder frame.  The tilt of a command is a wire code, 
 it once read, unchanged.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import IntEnum
 
 
@@ -276,3 +276,15 @@ class Garbled:
 
 
 Reply = Status | Registers | Identity | Ack | Nak | Faults | Parameter
+
+
+def command_text(command: Command) -> str:
+    """A command in a few words, for people."""
+    values = [getattr(command, field.name) for field in fields(command)]
+    return " ".join([type(command).__name__, *(_value_text(value) for value in values if value is not None)])
+
+
+def _value_text(value: object) -> str:
+    if isinstance(value, IntEnum):
+        return value.name
+    return f"{value:.3f}" if isinstance(value, float) else str(value)
