@@ -41,6 +41,7 @@ from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.pedestal import STEP_S
 from acu_daemon.sim.registers import CommandRegisters, turns_within
 from acu_daemon.sim.trace import TraceRow
+from acu_daemon.sim.wire_log import RegisterWrite
 
 MODEL = "3842"
 ALLOWED_UNDER_LOCAL = (Identify, Poll, ReadRegisters, Stop, ReadFaults, ReadParameter)
@@ -57,6 +58,7 @@ class FakeAcu:
         self.address = parts.address
         self.reply_latency_s = parts.scenario.acu.reply_latency_s
         self.observer: Callable[[TraceRow], None] | None = None
+        self.on_write: Callable[[RegisterWrite], None] | None = None
         self._has_tilt = parts.scenario.acu.has_tilt
         self._antenna = Antenna(parts)
         self._tick = 0
@@ -174,6 +176,9 @@ class FakeAcu:
         self._registers.write(az_deg, el_deg, tilt_code)
         self._modes.are_registers_written = True
         self._served_s = self._now_s
+        if self.on_write is not None:
+            modes, tai_s = self._modes, self._tai_s + self._part_s
+            self.on_write(RegisterWrite(tai_s, az_deg, el_deg, modes.mode, modes.follows_registers))
         return Ack()
 
     def _reset_fault(self) -> Reply:
