@@ -12,10 +12,11 @@ import structlog
 
 from acu_daemon.cli.options import Target, coming_pass
 from acu_daemon.cli.run import make_job
+from acu_daemon.control.refit import RefitSetup
 from acu_daemon.daemon.area import Snapshot
 from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.edge.clock import LoopClock
-from acu_daemon.edge.fit import InlineFitRunner
+from acu_daemon.edge.fit import FitRunner, InlineFitRunner
 from acu_daemon.protocol.messages import Command
 from acu_daemon.protocol.sa3842 import CommandDecoder, address_byte
 from acu_daemon.sim.acu import FakeAcu
@@ -82,16 +83,20 @@ def fly(
     seed: int = 1,
     byte_time_s: float = 0.0,
     script: Sequence[tuple[float, Action]] = (),
+    make_acu: Callable[[AcuParts], FakeAcu] = FakeAcu,
+    make_clock: Callable[[float], LoopClock] = LoopClock,
+    make_runner: Callable[[RefitSetup], FitRunner] = InlineFitRunner,
 ) -> Flight:
     """Run the daemon on a pass in virtual time.
 
     sky: a Sky, or a truth CSV.  script: what happens to the ACU and the link, each at its TAI, such as a power cycle.
+    make_...: other parts than the usual ones, such as a clock that stalls.
     """
     flight = Flight()
     truth = read_truth(sky) if isinstance(sky, Path) else sky
 
     async def main() -> None:
-        clock = LoopClock(begin_tai_s)
+        clock = make_clock(begin_tai_s)
         acu_section = target.station.acu
         parts = AcuParts(
             acu_section.azimuth.limits(),
@@ -103,11 +108,11 @@ def fly(
             seed,
             address_byte(acu_section.address),
         )
-        acu = FakeAcu(parts)
+        acu = make_acu(parts)
         acu.observer = flight.rows.append
         link = _TappedLink(acu, clock, byte_time_s, parts.address, flight)
         job = make_job(target, coming_pass(target, begin_tai_s), link, is_rehearsal=True, end_tai_s=end_tai_s)
-        service = Service(job, link, clock, InlineFitRunner(job.refit), on_snapshot=flight.snapshots.append)
+        service = Service(job, link, clock, make_runner(job.refit), on_snapshot=flight.snapshots.append)
         loop = asyncio.get_running_loop()
         for tai_s, action in script:
             loop.call_later(tai_s - begin_tai_s, action, Stage(acu, link, clock, service))
