@@ -26,6 +26,7 @@ from acu_daemon.sim.scenario import Scenario
 from acu_daemon.sim.sky import Sky, read_truth
 from acu_daemon.sim.trace import TraceRow
 from acu_daemon.sim.virtual import run_virtual
+from acu_daemon.sim.wire_log import RegisterWrite
 
 
 @dataclass
@@ -35,6 +36,7 @@ class Flight:
     rows: list[TraceRow] = field(default_factory=list)  # what really happened, ten a second
     snapshots: list[Snapshot] = field(default_factory=list)
     commands: list[tuple[float, Command]] = field(default_factory=list)  # start of the write, TAI, and the command
+    writes: list[RegisterWrite] = field(default_factory=list)  # what the ACU accepted
     events: list[dict[str, Any]] = field(default_factory=list)  # the log
     outcome: Outcome | None = None
 
@@ -110,6 +112,7 @@ def fly(
         )
         acu = make_acu(parts)
         acu.observer = flight.rows.append
+        acu.on_write = flight.writes.append
         link = _TappedLink(acu, clock, byte_time_s, parts.address, flight)
         job = make_job(target, coming_pass(target, begin_tai_s), link, is_rehearsal=True, end_tai_s=end_tai_s)
         service = Service(job, link, clock, make_runner(job.refit), on_snapshot=flight.snapshots.append)
