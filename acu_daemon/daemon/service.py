@@ -107,30 +107,28 @@ class Service:
         Raises: NoAcuError: no good poll at the start.  UsageError: a rehearsal on a real ACU.
         """
         reason, is_stopped = "error", False
-        async with asyncio.TaskGroup() as outer:
-            keeper = outer.create_task(self._port.keep(), name="link")
-            try:
-                reason = await self._track()
-            finally:
-                is_stopped = await self._safe_stop()
-                keeper.cancel()
-                await self._runner.close()
+        try:
+            async with asyncio.TaskGroup() as outer:
+                keeper = outer.create_task(self._port.keep(), name="link")
+                try:
+                    reason = await self._track()
+                finally:
+                    is_stopped = await self._safe_stop()
+                    keeper.cancel()
+                    await self._runner.close()
+        except ExceptionGroup as group:
+            raise _innermost(group) from None
         return self._outcome(reason, is_stopped)
 
     async def _track(self) -> str:
-        try:
-            async with asyncio.TaskGroup() as inner:
-                tasks = [
-                    inner.create_task(self._foreground.run(), name="foreground"),
-                    inner.create_task(self._background.run(), name="background"),
-                ]
-                reason = await self._supervise()
-                for task in tasks:
-                    task.cancel()
-        except ExceptionGroup as group:
-            if len(group.exceptions) == 1:
-                raise group.exceptions[0] from None
-            raise
+        async with asyncio.TaskGroup() as inner:
+            tasks = [
+                inner.create_task(self._foreground.run(), name="foreground"),
+                inner.create_task(self._background.run(), name="background"),
+            ]
+            reason = await self._supervise()
+            for task in tasks:
+                task.cancel()
         return reason
 
     async def _supervise(self) -> str:
@@ -254,3 +252,10 @@ class Service:
             lateness_p50_ms=lateness_ms[len(lateness_ms) // 2],
             lateness_p99_ms=lateness_ms[int(0.99 * (len(lateness_ms) - 1))],
         )
+
+
+def _innermost(error: Exception) -> Exception:
+    """The one error that task groups have wrapped, so that it keeps its exit status; several stay a group."""
+    while isinstance(error, ExceptionGroup) and len(error.exceptions) == 1:
+        error = error.exceptions[0]
+    return error
