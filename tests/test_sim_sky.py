@@ -85,6 +85,11 @@ def test_a_truth_file_that_cannot_be_used_names_its_line(text: str, expected: st
         read_truth(path)
 
 
+def test_a_truth_file_that_is_not_there_is_wrong_use(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"--truth .*none\.csv: No such file or directory"):
+        read_truth(tmp_path / "none.csv")
+
+
 def test_an_orbit_sky_agrees_with_the_look_angles() -> None:
     propagator, here = circular(), site()
     sky = OrbitSky(propagator, here)

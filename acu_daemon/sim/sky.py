@@ -74,7 +74,11 @@ class DirectionTable:
 def read_truth(path: Path) -> DirectionTable:
     """Read a truth CSV (design section 8).  UsageError: names file and line."""
     rows: list[tuple[float, float, float, float]] = []
-    with path.open(newline="") as file:
+    try:
+        file = path.open(newline="")
+    except OSError as error:
+        raise UsageError(f"--truth {path}: {error.strerror}") from None
+    with file:
         lines = csv.reader(file)
         if (header := next(lines, [])) != TRUTH_HEADER:
             raise UsageError(f"{path}, line 1: header {','.join(header)!r}, expected {','.join(TRUTH_HEADER)!r}")
