@@ -19,7 +19,7 @@ if [ ! -e "$stamp" ]; then
     fi
     rm -f .venv-problem
     echo "== installing dependencies, pinned by constraints.txt"
-    .venv/bin/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+    .venv/bin/pip install -qq --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
     touch "$stamp"
 fi
 export PATH="$PWD/.venv/bin:$PATH"
