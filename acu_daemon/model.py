@@ -4,7 +4,7 @@ Time is TAI seconds since 2000-01-01T12:00:00 TAI, one float (0.1 us today), mon
 Angles are degrees.  Azimuth is clockwise from true north.  "Encoder frame" means as the ACU counts it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import cos, radians
 from typing import Literal
 
@@ -74,13 +74,32 @@ class Readings:
 
 @dataclass(frozen=True, slots=True)
 class Correction:
-    """What a fit adds to the elements.
+    """What a fit adds to the mean elements of the source at its epoch.
 
-    delta_raan_rad and delta_mean_anomaly_rad act on the mean elements of the source at its epoch.
+    The eccentricity vector is (e cos argp, e sin argp).  A change of it turns the perigee and turns the mean anomaly
+    back by as much, so delta_mean_anomaly_rad is what the sum argp + mean anomaly gains: well defined on a circle too.
     """
 
     delta_raan_rad: float = 0.0
     delta_mean_anomaly_rad: float = 0.0
+    delta_mean_motion_rad_s: float = 0.0
+    delta_e_cos_argp: float = 0.0
+    delta_e_sin_argp: float = 0.0
+    delta_inclination_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class AngleBias:
+    """What the encoders show beyond the geometric angles, degrees; el is the elevation.
+
+    Azimuth shows az_deg + az_sec_deg / cos(el) more (the second is the same everywhere across the beam's path, like a
+    collimation error), elevation el_deg + el_cot_deg cot(el) (the second is shaped like refraction).
+    """
+
+    az_deg: float = 0.0
+    az_sec_deg: float = 0.0
+    el_deg: float = 0.0
+    el_cot_deg: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +114,9 @@ class FitResult:
     residual_rms_deg: float  # angle on the sky, newest readings against the fit
     along_s: float  # the correction for people: early (-) or late (+) along the track
     across_deg: float  # and across it, seen from the station, right of the motion positive
+    bias: AngleBias = AngleBias()
+    station_shift_enu_m: tuple[float, float, float] = (0.0, 0.0, 0.0)  # the station's true place minus the given one
+    covariance: Array | None = field(default=None, compare=False, repr=False)  # (13, 13), see assist.full_states
 
 
 PredictionKind = Literal["FITTED", "TLE"]

@@ -5,13 +5,14 @@ revolution; the slow (long-period) motion of the eccentricity vector by J3 is no
 Source: Brouwer, Solution of the problem of artificial satellite theory without drag, AJ 64 (1959) 378.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, sqrt
 
 import numpy as np
 
 from acu_daemon.errors import OrbitError
 from acu_daemon.model import Correction
+from acu_daemon.orbit.correction import corrected_ellipse
 from acu_daemon.orbit.kepler import OsculatingElements, perifocal_axes, solve_kepler
 from acu_daemon.units import EARTH_EQUATORIAL_RADIUS_M, J2, J4, MU_M3_S2, Array
 
@@ -100,15 +101,16 @@ class BrouwerPropagator:
     ) -> None:
         """Take the elements; without `short_period` the mean orbit itself is followed.
 
-        Raises:  OrbitError: elements that are no elliptic orbit.
+        Raises:  OrbitError: elements that are no elliptic orbit, as given or as corrected.
         """
-        if not (0.0 <= elements.e < 1.0 and elements.a_m > 0.0):
-            raise OrbitError(f"{elements.name}: not an ellipse: a = {elements.a_m} m, e = {elements.e}")
         self.elements = elements
         self.short_period = short_period
         self.correction = correction or Correction()
         self.epoch_tai_s = elements.epoch_tai_s
-        self._rates = secular_rates(elements.a_m, elements.e, elements.i_rad)
+        self._start = start = _corrected(elements, self.correction)
+        if not (0.0 <= start.e < 1.0 and start.a_m > 0.0):
+            raise OrbitError(f"{elements.name}: not an ellipse: a = {start.a_m} m, e = {start.e}")
+        self._rates = secular_rates(start.a_m, start.e, start.i_rad)
 
     def states_teme(self, tai_s: Array) -> tuple[Array, Array]:
         """Positions (N, 3) in metres and velocities (N, 3) in m/s, TEME of date, at the times (N,).
@@ -123,21 +125,37 @@ class BrouwerPropagator:
     def mean_elements(self, tai_s: Array) -> OsculatingElements:
         """The mean elements with their secular motion at the times (N,)."""
         elapsed_s = tai_s - self.epoch_tai_s
-        start, one = self.elements, np.ones_like(elapsed_s)
+        start, one = self._start, np.ones_like(elapsed_s)
         return OsculatingElements(
             a_m=start.a_m * one,
             e=start.e * one,
             i_rad=start.i_rad * one,
-            raan_rad=start.raan_rad + self.correction.delta_raan_rad + self._rates.raan_rad_s * elapsed_s,
+            raan_rad=start.raan_rad + self._rates.raan_rad_s * elapsed_s,
             argp_rad=start.argp_rad + self._rates.argp_rad_s * elapsed_s,
-            mean_anomaly_rad=start.mean_anomaly_rad
-            + self.correction.delta_mean_anomaly_rad
-            + self._rates.mean_anomaly_rad_s * elapsed_s,
+            mean_anomaly_rad=start.mean_anomaly_rad + self._rates.mean_anomaly_rad_s * elapsed_s,
         )
 
     def corrected(self, correction: Correction) -> "BrouwerPropagator":
         """The same elements with this correction in place of any earlier one."""
         return BrouwerPropagator(self.elements, self.short_period, correction)
+
+
+def _corrected(elements: BrouwerElements, correction: Correction) -> BrouwerElements:
+    """Add the correction; the mean motion's by Kepler's third law to the semi-major axis."""
+    ellipse = corrected_ellipse(elements.e, elements.argp_rad, elements.mean_anomaly_rad, correction)
+    a_m = elements.a_m
+    if correction.delta_mean_motion_rad_s != 0.0:
+        n = sqrt(MU_M3_S2 / a_m**3) + correction.delta_mean_motion_rad_s
+        a_m = (MU_M3_S2 / n**2) ** (1.0 / 3.0)
+    return replace(
+        elements,
+        a_m=a_m,
+        e=ellipse.e,
+        i_rad=elements.i_rad + correction.delta_inclination_rad,
+        raan_rad=elements.raan_rad + correction.delta_raan_rad,
+        argp_rad=ellipse.argp_rad,
+        mean_anomaly_rad=ellipse.mean_anomaly_rad,
+    )
 
 
 # Hill (polar-nodal) variables: radius, argument of latitude, node, radial speed, momentum, its z component.  The

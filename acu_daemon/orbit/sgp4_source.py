@@ -8,6 +8,7 @@ from sgp4.api import SGP4_ERRORS, WGS72, Satrec
 
 from acu_daemon.errors import OrbitError
 from acu_daemon.model import Correction
+from acu_daemon.orbit.correction import corrected_ellipse
 from acu_daemon.orbit.element_set import ElementSet
 from acu_daemon.orbit.timescales import utc_days, utc_text
 from acu_daemon.units import DAY_S, Array
@@ -17,7 +18,7 @@ _DECAYED = 6
 
 
 class Sgp4Propagator:
-    """A satellite's motion by SGP4, the correction added to node and mean anomaly of the mean elements.
+    """A satellite's motion by SGP4, the correction added to the mean elements before SGP4 is set up.
 
     Times enter as the seconds elapsed since the epoch, so a leap second in between moves nothing.
     Immutable; pickled as the elements and the correction.
@@ -59,6 +60,7 @@ class Sgp4Propagator:
 
 def _satrec(elements: ElementSet, correction: Correction) -> Any:
     day, fraction = utc_days(np.array(elements.epoch_tai_s))
+    ellipse = corrected_ellipse(elements.eccentricity, elements.argp_rad, elements.mean_anomaly_rad, correction)
     satrec = Satrec()
     satrec.sgp4init(
         WGS72,
@@ -68,11 +70,11 @@ def _satrec(elements: ElementSet, correction: Correction) -> Any:
         elements.bstar_per_radius,
         0.0,  # the mean motion's derivatives take no part in SGP4
         0.0,
-        elements.eccentricity,
-        elements.argp_rad,
-        elements.inclination_rad,
-        (elements.mean_anomaly_rad + correction.delta_mean_anomaly_rad) % (2.0 * pi),
-        elements.mean_motion_rad_s * 60.0,
+        ellipse.e,
+        ellipse.argp_rad,
+        elements.inclination_rad + correction.delta_inclination_rad,
+        ellipse.mean_anomaly_rad % (2.0 * pi),
+        (elements.mean_motion_rad_s + correction.delta_mean_motion_rad_s) * 60.0,
         (elements.raan_rad + correction.delta_raan_rad) % (2.0 * pi),
     )
     return satrec
