@@ -44,7 +44,7 @@ from acu_daemon.report.wire import LossFigures, WriteFigures, measure_losses, me
 
 PASSES = Path(__file__).resolve().parents[2] / "shared" / "data" / "passes"
 DEFAULT_PASS = "iss-2022-Huntsville-20220211T2156"
-DEMO_UTC = "2026-08-18T12:40:00Z"  # in the pass of the demo's satellite
+DEMO_UTC = "2026-08-20T00:20:00Z"  # in a pass of the demo's satellite that its drive can follow, 73.6 deg high
 LINKS = ("tcp", "pty")
 SATELLITE = "bench"
 NOISE_DEG = 0.03

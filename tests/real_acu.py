@@ -1,0 +1,63 @@
+"""A small ACU on TCP, built on the codec alone, that says it is a real one; it remembers what it was asked."""
+
+import contextlib
+import socket
+import threading
+from collections.abc import Iterator
+
+from acu_daemon.protocol.messages import (
+    Ack,
+    AcuMode,
+    Command,
+    Identify,
+    Identity,
+    Parameter,
+    Poll,
+    ReadParameter,
+    ReadRegisters,
+    Registers,
+    Reply,
+    Status,
+)
+from acu_daemon.protocol.sa3842 import CommandDecoder, encode_reply
+
+STANDING = Status(az_deg=100.0, el_deg=40.0, mode=AcuMode.STANDBY)
+
+
+def answer(command: Command) -> Reply:
+    match command:
+        case Identify():
+            return Identity("3842", "10")
+        case Poll():
+            return STANDING
+        case ReadRegisters():
+            return Registers(STANDING.az_deg, STANDING.el_deg, 0, 0)
+        case ReadParameter(name):
+            return Parameter(name, 0)
+    return Ack()
+
+
+@contextlib.contextmanager
+def real_acu() -> Iterator[tuple[str, list[Command]]]:
+    """Serve one client; yields the URL, and the commands as they come."""
+    asked: list[Command] = []
+
+    def serve() -> None:
+        with contextlib.suppress(OSError):  # the client, or the test, has gone
+            client, _ = server.accept()
+            with client:
+                decoder = CommandDecoder(gap_s=1e9)
+                while data := client.recv(4096):
+                    for event in decoder.feed(data, 0.0):
+                        assert event.command is not None
+                        asked.append(event.command)
+                        client.sendall(encode_reply(event.cmd, answer(event.command)))
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        thread = threading.Thread(target=serve)
+        thread.start()
+        try:
+            yield f"tcp://127.0.0.1:{server.getsockname()[1]}", asked
+        finally:
+            server.shutdown(socket.SHUT_RDWR)
+            thread.join()

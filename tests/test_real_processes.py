@@ -1,0 +1,238 @@
+"""The real commands as processes of their own, on the real clock, over TCP and a paced pseudo terminal.
+
+Asserts what happened and counts, never speed: the machine may be busy.  The long bench runs beside all other tests.
+"""
+
+import contextlib
+import json
+import os
+import re
+import select
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pytest
+from command_line import acu_daemon
+from real_acu import real_acu
+from script_modules import load
+
+from acu_daemon.protocol.messages import Identify, Poll, ReadRegisters
+from acu_daemon.report.trace import read_trace
+
+bench_pass = load("bench_pass")
+pytestmark = pytest.mark.realtime
+
+WINDOW_S = 60.0
+PATIENCE_S = 60.0  # a hang fails the test; a slow machine does not
+MAX_ERROR_DEG = 0.1
+ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
+ON_A_TERMINAL = (sys.executable, "-c", "import os, sys; os.login_tty(0); os.execv(sys.argv[1], sys.argv[1:])")
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator["Future[dict[str, Any]]"]:
+    """A window of a pass on both links at once."""
+    name = bench_pass.DEFAULT_PASS if bench_pass.PASSES.is_dir() else None
+    scene = bench_pass.make_scene(tmp_path_factory.mktemp("scene"), name, WINDOW_S)
+    directory = tmp_path_factory.mktemp("bench")
+
+    def run() -> dict[str, Any]:
+        ended = bench_pass.run_pass(scene, bench_pass.LINKS, directory, lambda _: None)
+        return {rig.link: bench_pass.measure(rig) for rig in ended}
+
+    with ThreadPoolExecutor(1) as pool:
+        yield pool.submit(run)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _the_bench_begins_with_the_first_test(request: pytest.FixtureRequest) -> None:
+    if any("bench" in getattr(item, "fixturenames", ()) for item in request.session.items):
+        request.getfixturevalue("bench")
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Iterator[Any]:
+    """A rig over TCP under two minutes of the demo's satellite; nothing is started yet."""
+    scene = bench_pass.make_scene(tmp_path / "scene", None, 120.0)
+    with bench_pass.rigs(scene, ["tcp"], tmp_path) as made:
+        yield made[0]
+
+
+def wait_until(is_so: Callable[[], bool]) -> None:
+    end_s = time.monotonic() + PATIENCE_S
+    while not is_so():
+        assert time.monotonic() < end_s, "it never came true"
+        time.sleep(0.05)
+
+
+def silence(rig: Any) -> None:
+    """No signal at all for the next simulated ACU."""
+    scenario = rig.config / "scenario.toml"
+    scenario.write_text(
+        scenario.read_text() + '[[loss]]\ncause = "silence-zone"\nstart_s = 0.0\nduration_s = 1000.0\n'
+    )
+
+
+def last_mode(rig: Any) -> str:
+    """Mode of the simulated ACU at its end."""
+    time.sleep(0.5)  # until the trace has it
+    rig.stop()
+    mode: str = read_trace(rig.trace).mode[-1]
+    return mode
+
+
+def test_sigterm_stops_the_antenna_and_the_recording_can_be_replayed(rig: Any, tmp_path: Path) -> None:
+    recording, replayed = tmp_path / "readings.csv", tmp_path / "replayed.csv"
+    rig.start_acu()
+    rig.start_daemon("--record", str(recording))
+    wait_until(lambda: rig.state == "AUTOTRACK/FITTED")
+    rig.daemon.send_signal(signal.SIGTERM)
+    assert rig.daemon.wait(PATIENCE_S) == 0
+    (done,) = rig.events("run.done")
+    assert (done["reason"], done["is_stopped"], done["refusal_count"]) == ("SIGTERM", True, 0)
+    assert rig.errors.read_text() == ""
+    assert last_mode(rig) == "STANDBY"
+
+    replay = acu_daemon(
+        "replay", "--config", rig.config, "--satellite", "bench", "--readings", recording, "--out", replayed
+    )
+    assert replay.code == 0, replay.err
+    assert len(replayed.read_text().splitlines()) == len(recording.read_text().splitlines()) > 20
+
+
+def test_a_pipe_gets_json_lines_that_all_say_rehearsal(rig: Any) -> None:
+    rig.start_acu()
+    rig.start_daemon("--duration", "4")
+    assert rig.daemon.wait(PATIENCE_S) in (0, 1)
+    entries = [json.loads(line) for line in rig.log.read_text().splitlines()]
+    assert all(entry["REHEARSAL"] is True for entry in entries)
+    assert {"run.start", "link.open", "acu.identified", "run.done"} <= {entry["event"] for entry in entries}
+
+
+@contextlib.contextmanager
+def on_a_terminal(arguments: list[str]) -> Iterator[tuple[int, "subprocess.Popen[bytes]"]]:
+    """A process with a controlling terminal of its own; yields the terminal's other end."""
+    master, slave = os.openpty()
+    process = subprocess.Popen([*ON_A_TERMINAL, *arguments], stdin=slave, stdout=slave, stderr=slave)
+    os.close(slave)
+    try:
+        yield master, process
+    finally:
+        process.kill()
+        process.wait()
+        os.close(master)
+
+
+def read_terminal(master: int, until: str) -> str:
+    """What the terminal shows until a text comes, or until the process has gone."""
+    shown = ""
+    end_s = time.monotonic() + PATIENCE_S
+    while until not in shown:
+        assert time.monotonic() < end_s, shown
+        if not select.select([master], [], [], 0.5)[0]:
+            continue
+        try:
+            shown += os.read(master, 65536).decode()
+        except OSError:  # EIO: nobody holds the terminal any more
+            break
+    return shown
+
+
+def test_a_terminal_shows_readable_lines_and_a_live_line_and_control_c_stops_safely(rig: Any, tmp_path: Path) -> None:
+    rig.start_acu()
+    with on_a_terminal([*rig.arguments("run"), "--state", str(tmp_path / "state")]) as (master, process):
+        shown = read_terminal(master, until="state=AUTOTRACK/FITTED")
+        shown += read_terminal(master, until="AUTOTRACK/FITTED az")
+        os.write(master, b"\x03")
+        shown += read_terminal(master, until="\0")
+        assert process.wait(PATIENCE_S) == 0
+    assert last_mode(rig) == "STANDBY"
+    assert "\r\x1b[K" in shown
+    lines = [line for line in re.split(r"[\r\n]+", ANSI.sub("", shown)) if line.strip("^C ")]
+    assert [line for line in lines if "REHEARSAL" not in line] == []
+    assert any("buffer" in line and "off prediction" in line for line in lines)
+    assert any("run.done" in line and "reason=SIGTERM" in line for line in lines)
+    assert not any(line.startswith("{") for line in lines)
+    assert "Traceback" not in shown
+
+
+def test_without_an_acu_the_run_ends_with_status_3_and_says_what_to_check(rig: Any) -> None:
+    with socket.socket() as held:
+        held.bind(("127.0.0.1", 0))  # nobody listens there
+        url = f"tcp://127.0.0.1:{held.getsockname()[1]}"
+        station = rig.config / "station.toml"
+        station.write_text(station.read_text().replace("tcp://127.0.0.1:3842", url))
+        rig.start_daemon()
+        assert rig.daemon.wait(PATIENCE_S) == 3
+    assert rig.errors.read_text() == (
+        f"acu-daemon: no good poll within 10 s: nobody listens at {url}: "
+        "check the port, and that the ACU or the simulator is on\n"
+    )
+
+
+def test_an_acu_that_dies_and_comes_back_is_steered_on_without_a_signal(rig: Any) -> None:
+    rig.start_acu()
+    rig.start_daemon()
+    wait_until(lambda: rig.state == "AUTOTRACK/FITTED")
+    time.sleep(5.0)  # readings to fit
+    rig.acu.kill()
+    rig.acu.wait()
+    rig.acu.stdout.close()
+    wait_until(lambda: rig.state == "LINK-LOST")
+    silence(rig)
+    rig.start_acu()
+    wait_until(lambda: rig.state == "ACQUIRE/TLE")
+    time.sleep(5.0)
+    rig.daemon.send_signal(signal.SIGTERM)
+    assert rig.daemon.wait(PATIENCE_S) == 0
+    assert len(rig.events("link.open")) == 2
+    rig.stop()
+    trace = read_trace(rig.trace)
+    assert trace.is_acquired.sum() == 0
+    followed = [i for i, mode in enumerate(trace.mode) if mode == "ACQUIRE"]
+    on_the_path = slice(followed[20], followed[-1])  # its first two seconds are the last of the way there
+    assert trace.error_deg[on_the_path].max() <= MAX_ERROR_DEG
+
+
+def test_a_satellite_that_was_never_acquired_ends_with_status_1(rig: Any) -> None:
+    silence(rig)
+    rig.start_acu()
+    rig.start_daemon("--duration", "8")
+    assert rig.daemon.wait(PATIENCE_S) == 1
+    (done,) = rig.events("run.done")
+    assert (done["reason"], done["has_acquired"], done["is_stopped"]) == ("duration over", False, True)
+    assert last_mode(rig) == "STANDBY"
+
+
+def test_a_rehearsal_writes_nothing_to_an_acu_that_says_it_is_a_real_one(rig: Any) -> None:
+    with real_acu() as (url, asked):
+        station = rig.config / "station.toml"
+        station.write_text(station.read_text().replace("tcp://127.0.0.1:3842", url))
+        rig.start_daemon()
+        assert rig.daemon.wait(PATIENCE_S) == 2
+    assert {type(command) for command in asked} <= {Identify, Poll, ReadRegisters}
+    assert Identify() in asked
+    assert "the ACU is a real one (SA-3842 10): a rehearsal (--at) runs only on a simulated ACU" in (
+        rig.errors.read_text()
+    )
+
+
+@pytest.mark.parametrize("link", ["tcp", "pty"])
+def test_a_pass_with_a_loss_is_tracked_over_both_links(bench: "Future[dict[str, Any]]", link: str) -> None:
+    result = bench.result()[link]
+    assert result.exit_status == 0
+    assert result.losses.loss_s == pytest.approx(WINDOW_S * 0.35, abs=0.5)
+    assert result.losses.beam_error_max_deg <= MAX_ERROR_DEG
+    assert result.losses.relock_s <= 3.0
+    assert result.writes.autotrack_max_deg <= MAX_ERROR_DEG
+    assert result.writes.rate_share <= 1.0
+    assert 9.0 <= result.writes.writes_per_s <= 10.2
+    assert (result.refusal_count, result.refit_failed_count) == (0, 0)
+    assert result.refit_count > 10
