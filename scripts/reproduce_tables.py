@@ -1,0 +1,149 @@
+#!/usr/bin/env python3
+"""The simulations of seeds 000 and 002 run again, many times: 18 rows x methods, beside the papers' figures.
+
+    .venv/bin/python scripts/reproduce_tables.py                    100 runs, table on standard output
+    .venv/bin/python scripts/reproduce_tables.py --json FILE        the same as JSON
+    .venv/bin/python scripts/reproduce_tables.py --plot FILE.png    every row as a picture
+    .venv/bin/python scripts/reproduce_tables.py --figures DIR      figures 5.2-5.7 of seed 002
+    .venv/bin/python scripts/reproduce_tables.py --pass-8-as-printed
+
+The same seed gives the same figures, however many processes run.  It needs brahe: pip install 'acu-daemon[accuracy]'.
+Errors are eps = sqrt(dA^2 + dh^2) without cos h, the largest over the predicted rest of the pass.
+"""
+
+import argparse
+import json
+import multiprocessing
+import os
+import sys
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+from tables.bound import bounds_deg
+from tables.charts import plot_figures_5, plot_rows
+from tables.errors_put_in import draw_errors
+from tables.methods import IN_TABLE, METHODS
+from tables.rows import Row, rows_of, table_text
+from tables.seed_figures import PASSES, PRINTED_PASS_8, SeedPass
+from tables.simulate import errors_over_time_deg, largest_errors_deg
+from tables.true_pass import TruePass, true_passes
+
+CHUNK = 5  # runs that a process does at once
+SEED = 1990
+FIGURE_USED_S = 210  # seed 002, figures 5.2-5.7 show a loss in the pass 2 asc. over Alcantara
+
+
+def simulate_chunk(
+    true_pass: TruePass, methods: tuple[str, ...], runs: list[np.random.SeedSequence]
+) -> dict[str, list[list[float]]]:
+    """Do some runs of a pass by every method, with the same errors for all."""
+    result: dict[str, list[list[float]]] = {name: [] for name in methods}
+    for run in runs:
+        errors = draw_errors(np.random.default_rng(run), true_pass.tai_s.size)
+        for name in methods:
+            result[name].append(largest_errors_deg(true_pass, METHODS[name], errors))
+    return result
+
+
+def reproduce(passes: tuple[SeedPass, ...], methods: tuple[str, ...], run_count: int, seed: int) -> list[Row]:
+    """Simulate every pass and give the rows, in the papers' order."""
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # for the processes to come: one each is enough
+    with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
+        orbits = dict.fromkeys(one.orbit for one in passes)
+        groups = [tuple(one for one in passes if one.orbit == orbit) for orbit in orbits]
+        say(f"integrating {len(orbits)} reference orbits")
+        found = {one.seed: one for group in pool.map(true_passes, groups) for one in group}
+        ordered = [found[one] for one in passes]
+        sequences = np.random.SeedSequence(seed).spawn(len(passes))
+        jobs = {}
+        for k, (true_pass, sequence) in enumerate(zip(ordered, sequences, strict=True)):
+            runs = sequence.spawn(run_count)
+            for start in range(0, run_count, CHUNK):
+                jobs[pool.submit(simulate_chunk, true_pass, methods, runs[start : start + CHUNK])] = (k, start)
+        done = {}
+        for count, job in enumerate(as_completed(jobs), 1):
+            done[jobs[job]] = job.result()
+            progress(count, len(jobs))
+    rows = []
+    for k, true_pass in enumerate(ordered):
+        chunks = [done[key] for key in sorted(done) if key[0] == k]
+        eps_deg = {name: np.array([run for chunk in chunks for run in chunk[name]]) for name in methods}
+        rows += rows_of(true_pass, eps_deg, bounds_deg(true_pass, np.random.default_rng(seed)))
+    return rows
+
+
+def say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def progress(done: int, total: int) -> None:
+    """One line on standard error, redrawn on a terminal, every tenth elsewhere."""
+    width = 40
+    filled = width * done // total
+    bar = f"[{'#' * filled}{'.' * (width - filled)}] {done}/{total}"
+    if sys.stderr.isatty():
+        print(f"\r{bar}", end="\n" if done == total else "", file=sys.stderr, flush=True)
+    elif done == total or done * 10 // total != (done - 1) * 10 // total:
+        say(bar)
+
+
+def options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--runs", type=int, default=100, help="runs of each pass (100)")
+    parser.add_argument("--seed", type=int, default=SEED, help="of the random numbers")
+    parser.add_argument("--methods", default=",".join(IN_TABLE), help=f"of {', '.join(METHODS)}")
+    parser.add_argument("--only", default="", help="passes whose station and name hold this")
+    parser.add_argument("--pass-8-as-printed", action="store_true", help="the printed elements for pass 8")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows as JSON")
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the rows (PNG)")
+    parser.add_argument("--figures", type=Path, metavar="DIR", help="draw figures 5.2-5.7 of seed 002 there")
+    chosen = parser.parse_args()
+    chosen.methods = tuple(chosen.methods.split(","))
+    unknown = [name for name in chosen.methods if name not in METHODS]
+    if unknown:
+        parser.error(f"no method {unknown[0]!r}: expected some of {', '.join(METHODS)}")
+    if chosen.runs < 1:
+        parser.error("--runs must be 1 or more")
+    return chosen
+
+
+def main() -> int:
+    chosen = options()
+    if find_spec("brahe") is None:
+        say("the reference orbit needs brahe: pip install -c constraints.txt '.[accuracy]'")
+        return 2
+    if chosen.figures:
+        draw_figures(chosen.figures, chosen.runs, chosen.seed)
+        return 0
+    every = PRINTED_PASS_8 if chosen.pass_8_as_printed else PASSES
+    passes = tuple(one for one in every if chosen.only.lower() in f"{one.station} {one.label}".lower())
+    if not passes:
+        say(f"no pass holds {chosen.only!r}: there are {', '.join(f'{one.station} {one.label}' for one in every)}")
+        return 2
+    rows = reproduce(passes, chosen.methods, chosen.runs, chosen.seed)
+    print(table_text(rows, chosen.methods))
+    if chosen.json:
+        chosen.json.write_text(json.dumps({"rows": [row.as_json() for row in rows]}, indent=1) + "\n")
+    if chosen.plot:
+        plot_rows(chosen.plot, rows, chosen.methods, chosen.runs)
+    return 0
+
+
+def draw_figures(folder: Path, run_count: int, seed: int) -> None:
+    """Errors over time of the pass that the papers show: both their methods."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (true_pass,) = true_passes(PASSES[:1])
+    runs = np.random.SeedSequence(seed).spawn(run_count)
+    curves: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {"deterministic": [], "kalman": []}
+    for count, run in enumerate(runs, 1):
+        errors = draw_errors(np.random.default_rng(run), true_pass.tai_s.size)
+        for name, found in curves.items():
+            found.append(errors_over_time_deg(true_pass, METHODS[name], errors, FIGURE_USED_S))
+        progress(count, run_count)
+    plot_figures_5(folder / "seed-002-figures.png", true_pass, curves, FIGURE_USED_S)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
