@@ -23,20 +23,20 @@ def find_causes(state: ControlState, sky: Sky, silence_s: float, now_tai_s: floa
     status = state.status
     if silence_s > LINK_SILENCE_S or status is None:
         return {Cause.LINK_SILENT}
-    causes = {Cause.LINK_BACK} | _of_status(status)
+    causes = {Cause.LINK_BACK} | _of_status(status, is_stow_kept=state.is_stow_kept)
     if state.stage is Stage.READY and config.is_armed:
-        causes |= _of_signal(state, status, sky)
+        causes |= _of_signal(state, status, sky, now_tai_s)
         causes |= _of_plan(state, status, sky, now_tai_s, config)
         causes |= _of_time(state, sky, now_tai_s, config)
     return causes
 
 
-def _of_status(status: Status) -> set[Cause]:
+def _of_status(status: Status, *, is_stow_kept: bool) -> set[Cause]:
     is_local = not status.is_remote_enabled or status.mode is AcuMode.MANUAL
     is_stowed = status.mode in (AcuMode.STOWING, AcuMode.STOWED)
     causes = {Cause.LOCAL_PANEL if is_local else Cause.REMOTE_AGAIN}
     causes.add(Cause.ACU_FAULT if status.mode is AcuMode.FAULT else Cause.FAULT_GONE)
-    if status.mode is AcuMode.STOWING:
+    if is_stow_kept:
         causes.add(Cause.STOWING)
     if not is_stowed:
         causes.add(Cause.STOW_LEFT)
@@ -48,11 +48,12 @@ def is_acquired(status: Status) -> bool:
     return status.mode is AcuMode.AUTOTRACK and status.is_acquired
 
 
-def _of_signal(state: ControlState, status: Status, sky: Sky) -> set[Cause]:
+def _of_signal(state: ControlState, status: Status, sky: Sky, now_tai_s: float) -> set[Cause]:
     has_fit = sky.prediction is not None and sky.prediction.kind == "FITTED"
     causes = {Cause.FIT} if has_fit else set()
     if is_acquired(status):
-        if sky.plan is not None:
+        is_ours = sky.plan is not None and now_tai_s >= sky.plan.rise_tai_s - ACQUIRE_LEAD_S
+        if is_ours:  # before that it is another satellite
             causes.add(Cause.ACQUIRED_FITTED if has_fit else Cause.ACQUIRED)
         if has_fit and state.track is TrackState.HOLD_FITTED:
             causes.add(Cause.ACQUIRED)

@@ -69,6 +69,7 @@ class ControlState:
     track_of_readings: tuple[tuple[float, float, float], ...] = ()  # the newest: time, continuous azimuth, elevation
     acquired_since_tai_s: float | None = None
     has_acquired: bool = False
+    is_stow_kept: bool = False  # somebody stowed the antenna while we looked on: it stays, also after a lost link
     hold_from_tai_s: float = -inf
     offset_az_deg: float | None = None  # reading minus prediction, smoothed: carries the path before the first fit
     offset_el_deg: float = 0.0
@@ -81,6 +82,7 @@ class ControlState:
     lag_el: LagEstimate = LagEstimate()
     last_extra: Command | None = None
     extra_after_tai_s: float = -inf
+    refused_tai_s: float = -inf  # the newest refusal of a register write
     refused_until_tai_s: float = -inf
     gate_refusal_count: int = 0
     refusal: str = ""  # of the gate, so that only its change is logged

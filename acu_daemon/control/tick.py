@@ -25,15 +25,18 @@ from acu_daemon.control.states import ACTIVE, AUTOTRACKING, HOLDING, TrackState,
 from acu_daemon.model import Pointing, Reading
 from acu_daemon.pointing.wrap import encoder_continuous
 from acu_daemon.protocol.angles import LSB_DEG
-from acu_daemon.protocol.messages import Command, Poll, Status, WriteAndPoll
+from acu_daemon.protocol.messages import AcuMode, Command, Nak, Poll, Status, WriteAndPoll
 from acu_daemon.units import wrap_180
 
-OFFSET_GAIN = 0.3  # of the newest reading in the smoothed distance between reading and prediction
+OFFSET_GAIN = 0.6  # of the newest reading in the smoothed distance to the prediction: autotrack pulls in quickly
 RATE_READINGS = 6  # the rate of an axis is taken over this many readings: near the zenith one pair is all noise
 EXTRA_REPEAT_S = 0.3  # a command gets this long to show in the status before it is sent again
+SETTLE_S = 1.0  # after a change of state the servo takes up the path: what it is short of then is no lag
 CALM_SHARE = 0.25  # of the drive's rate: above it a lag is what the drive cannot do, not what it does late
 STEADY_SHARE = 0.1  # of a step of the registers: more change than that from one to the next is acceleration
-REFUSED_PAUSE_S = 1.0  # after a NAK: no blind repetition
+REFUSED_EXTRA_S = 2.0  # after a NAK the same extra command waits this long: no blind repetition
+REFUSED_PAUSE_S = 1.0  # a write that is refused again within REFUSED_AGAIN_S waits this long
+REFUSED_AGAIN_S = 2.0
 
 
 def tick(
@@ -72,8 +75,12 @@ def _absorb(
 ) -> ControlState:
     if seen.extra is not None:
         state = after_reply(state, seen.extra)
+        if isinstance(seen.extra.reply, Nak):
+            state = replace(state, extra_after_tai_s=now_tai_s + REFUSED_EXTRA_S)
     if seen.refused is not None:
-        state = replace(state, refused_until_tai_s=now_tai_s + REFUSED_PAUSE_S)
+        is_again = now_tai_s - state.refused_tai_s < REFUSED_AGAIN_S
+        pause_s = REFUSED_PAUSE_S if is_again else 0.0
+        state = replace(state, refused_tai_s=now_tai_s, refused_until_tai_s=now_tai_s + pause_s)
         sent = state.commands[-1] if state.commands else None
         events.append(
             Event("acu.refused_write", {"az_deg": sent.az_deg, "el_deg": sent.el_deg} if sent else {}, is_warning=True)
@@ -96,7 +103,15 @@ def _absorb_reading(state: ControlState, status: Status, reading: Reading, confi
         track_of_readings=(*state.track_of_readings[1 - RATE_READINGS :], (reading.tai_s, az_deg, status.el_deg)),
         acquired_since_tai_s=since,
         has_acquired=state.has_acquired or since is not None,
+        is_stow_kept=_is_stow_kept(state, status),
     )
+
+
+def _is_stow_kept(state: ControlState, status: Status) -> bool:
+    """A stow that began after the start is somebody's wish; an antenna found stowed at the start is ours to take."""
+    if status.mode is AcuMode.STOWED:
+        return state.is_stow_kept or (state.status is not None and state.status.mode is not AcuMode.STOWED)
+    return status.mode is AcuMode.STOWING
 
 
 def _learn_lag(state: ControlState, az_deg: float, el_deg: float) -> ControlState:
@@ -222,7 +237,8 @@ def _sent(
         abs(passed.az.rate_deg_s) < CALM_SHARE * config.azimuth.max_rate_deg_s
         and abs(passed.el.rate_deg_s) < CALM_SHARE * config.elevation.max_rate_deg_s
     )
-    is_free = is_calm and is_followed and state.was_followed and not passed.is_held_back
+    is_settled = now_tai_s - state.entered_tai_s > SETTLE_S
+    is_free = is_calm and is_settled and is_followed and state.was_followed and not passed.is_held_back
     sent = Sent(az_deg, el_deg, is_free)
     state = replace(
         state,

@@ -67,11 +67,12 @@ class Background:
             return False
         prediction = area.sky.prediction
         is_loss = before in AUTOTRACKING and area.state.track in HOLDING
-        if prediction is None or is_loss:
+        if is_loss:
             return True
-        if area.to_fit and now_tai_s - self._last_tai_s >= REFIT_PERIOD_S:
-            return True
-        return prediction.end_tai_s - now_tai_s < self._low_water_s and now_tai_s - self._last_tai_s >= RETRY_S
+        since_last_s = now_tai_s - self._last_tai_s
+        if prediction is None or prediction.end_tai_s - now_tai_s < self._low_water_s:
+            return since_last_s >= RETRY_S
+        return bool(area.to_fit) and since_last_s >= REFIT_PERIOD_S
 
     async def _refit(self) -> None:
         area = self._area

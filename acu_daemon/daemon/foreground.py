@@ -11,6 +11,7 @@ import structlog
 from acu_daemon.assist.gate import Dwell
 from acu_daemon.control.causes import LINK_SILENCE_S, is_acquired
 from acu_daemon.control.state import ControlConfig, Event, Exchange, Observation
+from acu_daemon.control.states import AUTOTRACKING
 from acu_daemon.control.tick import tick
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.port import AcuPort, Answer
@@ -142,7 +143,7 @@ class Foreground:
             sample_tai_s = min(sample_tai_s, answer.first_byte_tai_s)
         reading = Reading(sample_tai_s, status.az_deg, status.el_deg, is_acquired(status))
         self._seen = replace(self._seen, status=status, reading=reading)
-        if self._dwell.is_locked(reading):
+        if self._dwell.is_locked(reading) and self._area.state.track in AUTOTRACKING:
             self._area.to_fit.append(reading)
         if self._on_reading is not None:
             self._on_reading(reading)
