@@ -1,7 +1,7 @@
 """Flights in virtual time for the tests of the daemon: targets, skies, and what a flight tells."""
 
 from collections.abc import Callable, Iterable, Sequence
-from itertools import pairwise
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,8 @@ import acu_daemon.cli as cli
 from acu_daemon.cli.options import Target, coming_pass, load_target
 from acu_daemon.cli.virtual_pass import Flight, Stage, fly
 from acu_daemon.model import Pass, sky_angle_deg
-from acu_daemon.orbit.timescales import tai_from_utc
+from acu_daemon.orbit.brouwer import BrouwerPropagator
+from acu_daemon.orbit.timescales import gmst_rad, tai_from_utc
 from acu_daemon.protocol.messages import Command, SelectBackup, SelectMode, WriteAndPoll, WriteParameter, WriteRegisters
 from acu_daemon.sim.build import make_sky
 from acu_daemon.sim.scenario import AcuChoice, Encoder, Loss, Scenario, SkyErrors
@@ -23,6 +24,7 @@ DEMO_TAI_S = tai_from_utc("2026-08-18T12:44:11Z")  # in mid-pass, 61 s before it
 DEMO_ANTENNA = AcuChoice(azimuth_deg=167.4, elevation_deg=58.0)  # where the satellite is then
 RISING_TAI_S = DEMO_TAI_S - 150.0  # in the climb of the same pass, slow on both axes
 RISING_ANTENNA = AcuChoice(azimuth_deg=168.0, elevation_deg=20.0)
+SCD_HIGH_TAI_S = tai_from_utc("1989-02-01T01:58:45Z") + 350.0  # SCD-1 climbs over Cuiaba
 WRONG_ORBIT = SkyErrors(along_track_s=0.9, delta_raan_deg=0.015)
 NOISE_DEG = 0.02
 EFFECT_S = 0.020  # start of a write to the moment it takes effect, ICD section 6, on TCP
@@ -72,6 +74,7 @@ def flight_of(
     script: Script = (),
     errors: SkyErrors = WRONG_ORBIT,
     noise_deg: float = NOISE_DEG,
+    sky: Sky | None = None,
     **parts: Any,
 ) -> Flight:
     """Fly; losses and script in seconds from the beginning."""
@@ -83,7 +86,7 @@ def flight_of(
     )
     return fly(
         target,
-        sky_of(target, errors),
+        sky or sky_of(target, errors),
         scenario,
         begin_tai_s=begin_tai_s,
         end_tai_s=begin_tai_s + duration_s,
@@ -154,10 +157,13 @@ def register_errors_deg(flight: Flight, sky: Sky, from_tai_s: float, to_tai_s: f
 
 
 def fastest_followed_deg_s(flight: Flight) -> tuple[float, float]:
-    """Largest rates of azimuth and elevation between two writes that the antenna follows, rounding taken off."""
+    """Largest rates of azimuth and elevation between two writes that the antenna follows, rounding taken off.
+
+    The first write after a loss is still one for an antenna that tracks by itself: the daemon learns from its reply.
+    """
     fastest_az, fastest_el = 0.0, 0.0
-    for first, second in pairwise(flight.writes):
-        if first.is_followed and second.is_followed:
+    for before, first, second in zip(flight.writes, flight.writes[1:], flight.writes[2:], strict=False):
+        if before.is_followed and first.is_followed and second.is_followed:
             span_s = second.tai_s - first.tai_s
             az_deg, el_deg = abs(wrap_180(second.az_deg - first.az_deg)), abs(second.el_deg - first.el_deg)
             fastest_az = max(fastest_az, (az_deg - LSB_DEG) / span_s)
@@ -169,3 +175,18 @@ def unwound_deg(flight: Flight, from_tai_s: float, to_tai_s: float) -> float:
     """Largest swing of the azimuth axis within any 10 s."""
     az = np.array([row.encoder_az_deg for row in rows_between(flight, from_tai_s, to_tai_s)])
     return float(np.max(np.abs(az[100:] - az[:-100]))) if az.size > 100 else 0.0
+
+
+def shifted(moment_tai_s: float) -> Target:
+    """SCD-1's orbit with another epoch, so that it stands high over the station at an instant."""
+    known = scd_target(SCD_HIGH_TAI_S)
+    source = known.elements.propagator
+    assert isinstance(source, BrouwerPropagator)
+    sidereal_rad = gmst_rad(np.array([SCD_HIGH_TAI_S, moment_tai_s]), 0.0)
+    elements = replace(
+        source.elements,
+        epoch_tai_s=source.epoch_tai_s + moment_tai_s - SCD_HIGH_TAI_S,
+        raan_rad=source.elements.raan_rad + float(sidereal_rad[1] - sidereal_rad[0]),
+    )
+    loaded = replace(known.elements, propagator=BrouwerPropagator(elements), epoch_tai_s=elements.epoch_tai_s)
+    return replace(known, elements=loaded)
