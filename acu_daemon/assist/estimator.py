@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from acu_daemon.assist.averages import CircularEstimator, DeterministicEstimator
+from acu_daemon.assist.full import FullEstimator
 from acu_daemon.assist.kalman import KalmanEstimator
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.errors import UsageError
@@ -32,6 +33,7 @@ ESTIMATORS: dict[str, Callable[[Propagator, Site, EstimatorSettings], Estimator]
     "deterministic": DeterministicEstimator,
     "kalman": KalmanEstimator,
     "full": KalmanEstimator,  # the result names the method that ran
+    "six": FullEstimator,
 }
 
 

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from acu_daemon.model import Prediction, PredictionKind, Site
-from acu_daemon.orbit.look import look_at
+from acu_daemon.assist.encoder import encoder_look, sigma_deg
+from acu_daemon.model import FitResult, Prediction, PredictionKind, Site
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import Array, wrap_180, wrap_180_array
 
@@ -29,6 +29,7 @@ def predict(
     step_s: float = 0.1,
     lead_in_s: float = 0.0,
     follow: FollowPath = _as_it_is,
+    fit: FitResult | None = None,
 ) -> Prediction:
     """Predict pointing from start_tai_s over horizon_s.
 
@@ -36,12 +37,14 @@ def predict(
     is continuous, through north and past the zenith.  follow: makes the path for an antenna that follows the registers,
     such as `pointing.keyhole.follow_path` with the drive's limits; it sees the path from lead_in_s before the start,
     so that a buffer that starts inside the keyhole continues what the one before it planned.
+    fit: what corrected the propagator; its biases and its place of the station are in the prediction, and its
+    covariance gives sigma_deg.
     Raises:  OrbitError: the propagator has no answer for one of the times.
     Source:  seed 000, section 4; 90 s at 10 Hz: seed 001, section 2.5.
     """
     before = round(lead_in_s / step_s)
     tai_s = start_tai_s + step_s * np.arange(-before, round(horizon_s / step_s) + 1, dtype=np.float64)
-    seen = look_at(propagator, tai_s, site)
+    seen = encoder_look(propagator, tai_s, site, fit)
     az_deg = _continuous(seen.az_deg, seen.az_rate_deg_s, step_s)
     az_deg += near_az_deg + wrap_180(float(seen.az_deg[before]) - near_az_deg) - az_deg[before]
     follow_az_deg, follow_az_rate_deg_s = follow(az_deg, seen.az_rate_deg_s, step_s)
@@ -56,6 +59,7 @@ def predict(
         follow_az_rate_deg_s=follow_az_rate_deg_s[before:],
         kind=kind,
         made_at_tai_s=made_at_tai_s,
+        sigma_deg=sigma_deg(propagator, tai_s[before:], site, fit),
     )
 
 

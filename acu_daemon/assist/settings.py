@@ -26,11 +26,38 @@ DAEMON = KalmanTuning(0.2, 2.0, 5e-5, 2e-4)  # measured over a population of orb
 
 
 @dataclass(frozen=True, slots=True)
+class ElementSigmas:
+    """What mean elements are worth, 1 sigma of each: the default for element sets (docs/decisions).
+
+    The mean motion's grows with the age of the elements.  e_vector: each of e cos argp and e sin argp.
+    """
+
+    raan_deg: float = 0.03
+    mean_anomaly_deg: float = 0.6
+    mean_motion_rad_min: float = 2e-8
+    mean_motion_per_day_rad_min: float = 0.0
+    e_vector: float = 3e-5
+    inclination_deg: float = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class StateSigmas:
+    """What a state is worth at the epoch, 1 sigma of each component of position and of velocity."""
+
+    position_m: float
+    velocity_m_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class EstimatorSettings:
     """What an estimator must know beside orbit and site.
 
-    Noise is 1 sigma, across the elevation (azimuth x cos(el)) and in elevation.  Without axis limits no reading counts
-    as too fast.  inversion_count: consecutive inversions that `circular` averages, 3 to 8 (seed 001, 2.6c).
+    Noise is 1 sigma, across the elevation (azimuth x cos(el)) and in elevation; `full` adds the cot term x cot(el) to
+    the elevation's.  Without axis limits no reading counts as too fast.  inversion_count: consecutive inversions that
+    `circular` averages, 3 to 8 (seed 001, 2.6c).
+
+    For `full`: the biases' sigmas (model.AngleBias), the orbit's (None: from the kind of elements and their age) and
+    the station's, east and north each, metres.
     """
 
     sigma_azimuth_deg: float = 0.05
@@ -41,3 +68,10 @@ class EstimatorSettings:
     elevation: AxisLimits | None = None
     inversion_count: int = 8
     kalman: KalmanTuning = DAEMON
+    sigma_elevation_cot_deg: float = 0.0
+    bias_sigma_azimuth_deg: float = 0.1
+    bias_sigma_azimuth_sec_deg: float = 0.003
+    bias_sigma_elevation_deg: float = 0.1
+    bias_sigma_elevation_cot_deg: float = 0.0
+    orbit_sigmas: ElementSigmas | StateSigmas | None = None
+    station_sigma_m: float = 0.0

@@ -72,5 +72,6 @@ class Refitter:
             near_az_deg=request.near_az_deg,
             lead_in_s=longest_window_s(setup.azimuth),
             follow=partial(follow_path, azimuth=setup.azimuth),
+            fit=fit,
         )
         return RefitReply(fit, prediction)

@@ -1,0 +1,88 @@
+"""Directions in the encoder frame as a fit has them: orbit, station's place and angle biases together.  Pure.
+
+Commands go through the same encoders as readings, so biases that a fit found belong into the commands.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from acu_daemon.assist.full_path import (
+    cot_el,
+    moved_site,
+    node_times,
+    orbit_partials_itrs,
+    path_itrs,
+    sec_el,
+    site_of,
+    sky_partials,
+)
+from acu_daemon.assist.full_states import STATION, states_of
+from acu_daemon.model import AngleBias, FitResult, Site
+from acu_daemon.orbit.look import Look, look_at
+from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.units import DEG, Array
+
+_SIGMA_STEP_S = 5.0
+
+
+def encoder_look(propagator: Propagator, tai_s: Array, site: Site, fit: FitResult | None) -> Look:
+    """What the encoders show when the antenna points at the satellite, at the times (N,).
+
+    propagator: already corrected by the fit.  Without a fit this is `look_at`.
+    Raises:  OrbitError: the propagator has no answer for one of the times.
+    """
+    if fit is None:
+        return look_at(propagator, tai_s, site)
+    seen = look_at(propagator, tai_s, moved_site(site, fit.station_shift_enu_m))
+    return seen if fit.bias == AngleBias() else _biased(seen, fit.bias)
+
+
+def _biased(seen: Look, bias: AngleBias) -> Look:
+    el = np.radians(seen.el_deg)
+    sin_el, cos_el = np.sin(el), np.cos(el)
+    cot, sec = cot_el(sin_el, cos_el), sec_el(cos_el)
+    return replace(
+        seen,
+        az_deg=(seen.az_deg + bias.az_deg + bias.az_sec_deg * sec) % 360.0 % 360.0,
+        el_deg=seen.el_deg + bias.el_deg + bias.el_cot_deg * cot,
+        az_rate_deg_s=seen.az_rate_deg_s + bias.az_sec_deg * DEG * sec * sec * sin_el * seen.el_rate_deg_s,
+        el_rate_deg_s=seen.el_rate_deg_s * (1.0 - bias.el_cot_deg * DEG * (1.0 + cot * cot)),
+    )
+
+
+def sigma_deg(propagator: Propagator, tai_s: Array, site: Site, fit: FitResult | None) -> Array | None:
+    """1 sigma of the predicted directions at the times (N,): root of the mean eigenvalue of the covariance on the sky.
+
+    None where the fit has no covariance.  Computed every few seconds and interpolated.
+    """
+    if fit is None or fit.covariance is None:
+        return None
+    first, last = float(tai_s[0]), float(tai_s[-1])
+    times = np.linspace(first, last, 2 + int((last - first) / _SIGMA_STEP_S))
+    across, both, upward = sky_covariance(propagator, times, site, fit)
+    del both
+    sigma: Array = np.interp(tai_s, times, np.sqrt((across + upward) / 2.0)) / DEG
+    return sigma
+
+
+def sky_covariance(propagator: Propagator, tai_s: Array, site: Site, fit: FitResult) -> tuple[Array, Array, Array]:
+    """Covariance of predicted directions, (N,) each, rad^2: across the elevation, both together, in elevation.
+
+    Raises:  ValueError: the fit has no covariance.
+    """
+    if fit.covariance is None:
+        raise ValueError(f"the estimator {fit.estimator} gives no covariance")
+    x = states_of(fit.correction, fit.bias, fit.station_shift_enu_m)
+    nodes = node_times(float(tai_s[0]), float(tai_s[-1]))
+    here = site_of(site, x)
+    path = path_itrs(propagator, x, site, nodes)
+    partials = orbit_partials_itrs(propagator, x, site, nodes)
+    has_shift = bool(fit.covariance[STATION, STATION].any())
+    h = sky_partials(path.at(tai_s), partials.at(tai_s), here, has_shift)
+    moved = np.tensordot(fit.covariance, h, 1)
+    return (
+        np.sum(h[..., 0] * moved[..., 0], axis=0),
+        np.sum(h[..., 0] * moved[..., 1], axis=0),
+        np.sum(h[..., 1] * moved[..., 1], axis=0),
+    )

@@ -1,0 +1,94 @@
+"""The `full` estimator: six orbit corrections, angle biases and the station's place, with their covariance.  Pure."""
+
+import numpy as np
+
+from acu_daemon.assist.base import BaseEstimator
+from acu_daemon.assist.full_solve import Sights, Solution, sights, solve
+from acu_daemon.assist.full_states import Prior, bias_of, correction_of, make_prior, shift_of
+from acu_daemon.assist.settings import EstimatorSettings
+from acu_daemon.model import Correction, FitResult, Readings, Site
+from acu_daemon.orbit.frames import station_itrs_m, teme_from_itrs
+from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.units import DEG
+
+_NEWEST_COUNT = 30
+
+
+class FullEstimator(BaseEstimator):
+    """Weighted least squares of all readings with a prior, behind the `Estimator` protocol (reference: full_solve)."""
+
+    name = "full"
+
+    def __init__(self, propagator: Propagator, site: Site, settings: EstimatorSettings) -> None:
+        super().__init__(propagator, site, settings)
+        self._prior: Prior | None = None
+        self._parts: list[Sights] = []
+        self._solution: Solution | None = None
+        self._is_new = False
+
+    def _use(self, readings: Readings) -> list[str | None]:
+        if self._prior is None:
+            self._prior = make_prior(self._source, self._settings, float(readings.tai_s[0]))
+        self._parts.append(sights(readings))
+        self._is_new = True
+        return [None] * len(readings)
+
+    def _correction(self) -> Correction | None:
+        return None if self._solution is None else correction_of(self._solution.x)
+
+    def fit(self) -> FitResult | None:
+        """Give the fit to all readings so far; None before the first.
+
+        Raises:  OrbitError: the source has no answer for one of the readings' times.
+        """
+        if self._prior is None:
+            return None
+        seen = _joined(self._parts)
+        self._parts = [seen]
+        if self._is_new or self._solution is None:
+            self._solution = solve(self._source, self._site, self._settings, self._prior, seen, self._solution)
+            self._is_new = False
+        return self._result(self._solution, float(seen.tai_s[-1]))
+
+    def _result(self, solution: Solution, at_tai_s: float) -> FitResult:
+        left_out = int(np.count_nonzero(solution.weights == 0.0))
+        newest = solution.residuals_rad[-_NEWEST_COUNT:]
+        correction = correction_of(solution.x)
+        along_s, across_deg = shift_for_people(self._source, correction, at_tai_s, self._site)
+        return FitResult(
+            estimator=self.name,
+            correction=correction,
+            at_tai_s=at_tai_s,
+            reading_count=self.used_count - left_out,
+            rejected_count=len(self.rejected) + left_out,
+            residual_rms_deg=float(np.sqrt(np.mean(np.sum(newest**2, axis=1)))) / DEG,
+            along_s=along_s,
+            across_deg=across_deg,
+            bias=bias_of(solution.x),
+            station_shift_enu_m=shift_of(solution.x),
+            covariance=solution.covariance,
+        )
+
+
+def _joined(parts: list[Sights]) -> Sights:
+    if len(parts) == 1:
+        return parts[0]
+    return Sights(*(np.concatenate([getattr(one, name) for one in parts]) for name in ("tai_s", "across", "upward")))
+
+
+def shift_for_people(source: Propagator, correction: Correction, tai_s: float, site: Site) -> tuple[float, float]:
+    """Show a correction as the whole move of the satellite at tai_s: seconds late (+), degrees across the track.
+
+    across_deg: as an angle on the sky of the station at that instant, right of the inertial motion positive.
+    """
+    at = np.array([tai_s])
+    (r0, v0), (r1, v1) = (one.states_teme(at) for one in (source, source.corrected(correction)))
+    r, v, move = r1[0], v1[0], (r1 - r0)[0]
+    right = np.cross(v, r)
+    right /= np.linalg.norm(right)
+    sight = r - teme_from_itrs(station_itrs_m(site.station), at, site.orientation)[0]
+    range_m = float(np.linalg.norm(sight))
+    foreshortening = float(np.sqrt(max(0.0, 1.0 - (float(right @ sight) / range_m) ** 2)))
+    middle = (v0[0] + v) / 2.0
+    along_s = -float(move @ middle) / float(middle @ middle)
+    return along_s, float(move @ right) * foreshortening / range_m / DEG

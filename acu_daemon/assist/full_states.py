@@ -1,0 +1,117 @@
+"""The states of the `full` estimator, their order, and what is known of them before any reading.  Pure.
+
+0-5    corrections of the mean elements at epoch, as in Correction: raan, mean anomaly, mean motion, e cos argp,
+       e sin argp, inclination (rad, rad/s for the mean motion)
+6-9    angle biases, as in AngleBias: azimuth, azimuth / cos(el), elevation, elevation x cot(el) (rad)
+10-12  the station's true place minus the given one: east, north, up (m)
+"""
+
+from dataclasses import dataclass, field
+from math import hypot, radians
+
+import numpy as np
+
+from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings, StateSigmas
+from acu_daemon.model import AngleBias, Correction
+from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.units import DAY_S, DEG, Array
+
+ORBIT_COUNT = 6
+STATE_COUNT = 13
+ORBIT, BIAS, STATION = slice(0, 6), slice(6, 10), slice(10, 13)
+STEPS = (1e-5, 1e-5, 1e-9, 1e-5, 1e-5, 1e-5)  # for differences: some 70 m each, 100 m after a day for the mean motion
+
+_UP_SHARE = 0.1  # coordinates are rounded in latitude and longitude; heights are known much better
+
+
+@dataclass(frozen=True, slots=True)
+class Prior:
+    """Mean (13,) and covariance (13, 13) of the states before the first reading."""
+
+    mean: Array
+    covariance: Array = field(repr=False)
+
+
+def correction_of(x: Array) -> Correction:
+    """The orbit's part of the states."""
+    return Correction(*x[ORBIT].tolist())
+
+
+def bias_of(x: Array) -> AngleBias:
+    """The biases among the states."""
+    return AngleBias(*(x[BIAS] / DEG).tolist())
+
+
+def shift_of(x: Array) -> tuple[float, float, float]:
+    """The station's shift among the states, east, north and up, metres."""
+    east_m, north_m, up_m = x[STATION].tolist()
+    return east_m, north_m, up_m
+
+
+def states_of(correction: Correction, bias: AngleBias, shift_enu_m: tuple[float, float, float]) -> Array:
+    """The states that a fit found, (13,)."""
+    orbit = [
+        correction.delta_raan_rad,
+        correction.delta_mean_anomaly_rad,
+        correction.delta_mean_motion_rad_s,
+        correction.delta_e_cos_argp,
+        correction.delta_e_sin_argp,
+        correction.delta_inclination_rad,
+    ]
+    biases = [bias.az_deg * DEG, bias.az_sec_deg * DEG, bias.el_deg * DEG, bias.el_cot_deg * DEG]
+    return np.array([*orbit, *biases, *shift_enu_m])
+
+
+def make_prior(source: Propagator, settings: EstimatorSettings, at_tai_s: float) -> Prior:
+    """What is known before the first reading, at at_tai_s; the orbit's by its age where the settings name no sigmas."""
+    covariance = np.zeros((STATE_COUNT, STATE_COUNT))
+    sigmas = settings.orbit_sigmas
+    if isinstance(sigmas, StateSigmas):
+        covariance[ORBIT, ORBIT] = _orbit_covariance_of_state(source, sigmas)
+    else:
+        covariance[ORBIT, ORBIT] = _orbit_covariance(sigmas or ElementSigmas(), abs(at_tai_s - source.epoch_tai_s))
+    bias_deg = (
+        settings.bias_sigma_azimuth_deg,
+        settings.bias_sigma_azimuth_sec_deg,
+        settings.bias_sigma_elevation_deg,
+        settings.bias_sigma_elevation_cot_deg,
+    )
+    covariance[BIAS, BIAS] = np.diag(np.radians(bias_deg) ** 2)
+    flat_m = settings.station_sigma_m
+    covariance[STATION, STATION] = np.diag(np.square([flat_m, flat_m, _UP_SHARE * flat_m]))
+    return Prior(np.zeros(STATE_COUNT), covariance)
+
+
+def _orbit_covariance(sigmas: ElementSigmas, age_s: float) -> Array:
+    days = age_s / DAY_S
+    mean_motion_rad_s = hypot(sigmas.mean_motion_rad_min, sigmas.mean_motion_per_day_rad_min * days) / 60.0
+    return np.diag(
+        np.square(
+            [
+                radians(sigmas.raan_deg),
+                radians(sigmas.mean_anomaly_deg),
+                mean_motion_rad_s,
+                sigmas.e_vector,
+                sigmas.e_vector,
+                radians(sigmas.inclination_deg),
+            ]
+        )
+    )
+
+
+def _orbit_covariance_of_state(source: Propagator, sigmas: StateSigmas) -> Array:
+    """Turn the same sigma of every component of position and velocity at epoch into elements.
+
+    The wide limit on each element keeps node and mean anomaly apart where the state does not (an equatorial orbit).
+    """
+    at = np.array([source.epoch_tai_s])
+    columns = []
+    for k, step in enumerate(STEPS):
+        x = np.zeros(STATE_COUNT)
+        x[k] = step
+        (r1, v1), (r0, v0) = (source.corrected(correction_of(s * x)).states_teme(at) for s in (1.0, -1.0))
+        columns.append(np.concatenate(((r1 - r0)[0] / sigmas.position_m, (v1 - v0)[0] / sigmas.velocity_m_s)) / 2)
+    scaled = np.array(columns).T  # by element in units of its step, in sigmas
+    information = scaled.T @ scaled + np.diag((np.array(STEPS) / np.array([1.0, 1.0, 1e-4, 1.0, 1.0, 1.0])) ** 2)
+    covariance: Array = np.linalg.inv(information) * np.outer(STEPS, STEPS)
+    return covariance
