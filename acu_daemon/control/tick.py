@@ -32,7 +32,6 @@ OFFSET_GAIN = 0.6  # of the newest reading in the smoothed distance to the predi
 RATE_READINGS = 6  # the rate of an axis is taken over this many readings: near the zenith one pair is all noise
 EXTRA_REPEAT_S = 0.3  # a command gets this long to show in the status before it is sent again
 SETTLE_S = 1.0  # after a change of state the servo takes up the path: what it is short of then is no lag
-SETTLE_S = 1.0  # after a change of state the servo takes up the path: what it is short of then is no lag
 CALM_SHARE = 0.25  # of the drive's rate: above it a lag is what the drive cannot do, not what it does late
 STEADY_SHARE = 0.1  # of a step of the registers: more change than that from one to the next is acceleration
 REFUSED_EXTRA_S = 2.0  # after a NAK the same extra command waits this long: no blind repetition
