@@ -20,293 +20,23 @@ Examples
 """
 
 import argparse
-import contextlib
 import json
-import math
-import shutil
-import signal
-import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
-from importlib import resources
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
-from acu_daemon.cli.options import coming_pass, load_target
-from acu_daemon.control.plan import plan_pass
+from pass_rig import DEFAULT_PASS, LINKS, BenchError, Rig, make_scene, run_pass
+from real_pass import pass_names
+
+from acu_daemon.cli.options import load_target
 from acu_daemon.errors import AcuDaemonError
-from acu_daemon.orbit.timescales import tai_from_utc, utc_text
+from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.report.trace import read_trace
 from acu_daemon.report.wire import LossFigures, WriteFigures, measure_losses, measure_writes, read_writes
 
-PASSES = Path(__file__).resolve().parents[2] / "shared" / "data" / "passes"
-DEFAULT_PASS = "iss-2022-Huntsville-20220211T2156"
-DEMO_UTC = "2026-08-20T00:20:00Z"  # in a pass of the demo's satellite that its drive can follow, 73.6 deg high
-LINKS = ("tcp", "pty")
-SATELLITE = "bench"
-NOISE_DEG = 0.03
-LOSS_FROM, LOSS_TO = 0.40, 0.75  # of the time benched
-LEAD_S = 4.0  # both processes need this long to start
-BEFORE_RISE_S = 30.0  # a whole pass begins this long before the rise
-SAY_EVERY_S = 5.0
-
-STATION = """\
-[station]
-name = "{station}"
-latitude_deg = {latitude_deg:.6f}
-longitude_deg = {longitude_deg:.6f}
-height_m = {height_m:.1f}
-[acu]
-url = "tcp://127.0.0.1:3842"
-[acu.azimuth]
-min_deg = -270.0
-max_deg = 270.0
-max_rate_deg_s = 20.0
-max_acceleration_deg_s2 = 10.0
-[acu.elevation]
-min_deg = 0.0
-max_deg = 90.0
-max_rate_deg_s = 5.0
-max_acceleration_deg_s2 = 5.0
-[receiver]
-beamwidth_deg = 1.0
-[time]
-ut1_utc_s = {ut1_utc_s}
-polar_motion_x_arcsec = {polar_motion_arcsec[0]}
-polar_motion_y_arcsec = {polar_motion_arcsec[1]}
-[readings]
-sigma_azimuth_deg = {noise_deg}
-sigma_elevation_deg = {noise_deg}
-"""
-REAL_SATELLITE = """\
-[satellite]
-name = "{satellite}"
-[elements]
-kind = "tle"
-file = "bench.tle"
-"""
-SCENARIO = """\
-[sky]
-along_track_s = {along_track_s}
-delta_raan_deg = {delta_raan_deg}
-[encoder]
-noise_deg = {noise_deg}
-[acu]
-azimuth_deg = {azimuth_deg:.3f}
-elevation_deg = {elevation_deg:.3f}
-[[loss]]
-cause = "receiver"
-from_utc = {from_utc}
-to_utc = {to_utc}
-"""
-
-
-class BenchError(Exception):
-    """The bench itself could not run."""
-
-
-@dataclass(frozen=True)
-class Scene:
-    """A configuration directory with station.toml, satellites/bench.toml and scenario.toml, and what it is about."""
-
-    config: Path
-    truth: Path | None
-    label: str
-    start_tai_s: float
-    end_tai_s: float
-    is_window: bool
-
-
-def make_scene(directory: Path, pass_name: str | None, window_s: float | None) -> Scene:
-    """Write the files of a bench.  pass_name: of ../shared/data/passes; None: the demo's satellite."""
-    config = directory / "config"
-    (config / "satellites").mkdir(parents=True)
-    if pass_name is None:
-        truth, sky = None, {"along_track_s": 0.9, "delta_raan_deg": 0.015}
-        label, near_tai_s = "DEMO-1 over Cuiaba", tai_from_utc(DEMO_UTC)
-        _copy_demo(config)
-    else:
-        truth, sky = PASSES / f"{pass_name}.truth.csv", {"along_track_s": 0.0, "delta_raan_deg": 0.0}
-        label, near_tai_s = pass_name, _write_real(config, pass_name)
-    target = load_target(config, SATELLITE, near_tai_s)
-    coming = coming_pass(target, near_tai_s)
-    span_s = coming.set_tai_s - coming.rise_tai_s
-    start_tai_s, end_tai_s = coming.rise_tai_s, coming.set_tai_s
-    if window_s is not None and window_s < span_s:
-        start_tai_s += (span_s - window_s) / 2
-        end_tai_s = start_tai_s + window_s
-    from_tai_s, to_tai_s = (start_tai_s + part * (end_tai_s - start_tai_s) for part in (LOSS_FROM, LOSS_TO))
-    limits = target.station.acu.azimuth.limits()
-    plan = plan_pass(target.elements.propagator, target.station.site, coming, 0.0, limits, start_tai_s)
-    scenario = SCENARIO.format(
-        **sky,
-        noise_deg=NOISE_DEG,
-        azimuth_deg=plan.start_az_deg,
-        elevation_deg=plan.start_el_deg,
-        from_utc=utc_text(from_tai_s),
-        to_utc=utc_text(to_tai_s),
-    )
-    (config / "scenario.toml").write_text(scenario)
-    is_window = start_tai_s > coming.rise_tai_s
-    return Scene(config, truth, label, start_tai_s - (0.0 if is_window else BEFORE_RISE_S), end_tai_s, is_window)
-
-
-def _copy_demo(config: Path) -> None:
-    with resources.as_file(resources.files("acu_daemon.cli") / "demo_config") as files:
-        shutil.copy(files / "station.toml", config)
-        shutil.copy(files / "satellites" / "demo-1.tle", config / "satellites")
-        shutil.copy(files / "satellites" / "demo-1.toml", config / "satellites" / f"{SATELLITE}.toml")
-
-
-def _write_real(config: Path, name: str) -> float:
-    """Write the configuration of a real pass; return a time in it."""
-    try:
-        about = json.loads((PASSES / f"{name}.json").read_text())
-        first, *_, last = (PASSES / f"{name}.truth.csv").read_text().splitlines()[1:]
-        shutil.copy(PASSES / f"{name}.tle", config / "satellites" / "bench.tle")
-    except OSError as error:
-        known = ", ".join(sorted(path.stem for path in PASSES.glob("*.json"))) or "none"
-        raise BenchError(f"pass {name}: {error}; passes there: {known}") from None
-    (config / "station.toml").write_text(STATION.format(**about, noise_deg=NOISE_DEG))
-    (config / "satellites" / f"{SATELLITE}.toml").write_text(REAL_SATELLITE.format(**about))
-    return sum(tai_from_utc(line.split(",")[0]) for line in (first, last)) / 2
-
-
-@dataclass
-class Rig:
-    """A simulated ACU and a daemon on one link and one clock; a directory of its own holds their files."""
-
-    link: str
-    scene: Scene
-    directory: Path
-    at_monotonic_s: float
-    acu: "subprocess.Popen[str] | None" = None
-    daemon: "subprocess.Popen[str] | None" = None
-    url: str = ""
-    config: Path = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.directory.mkdir(parents=True)
-        self.config = self.directory / "config"
-        shutil.copytree(self.scene.config, self.config)
-
-    @property
-    def trace(self) -> Path:
-        return self.directory / "trace.csv"
-
-    @property
-    def wire_log(self) -> Path:
-        return self.directory / "wire.csv"
-
-    @property
-    def log(self) -> Path:
-        return self.directory / "daemon.jsonl"
-
-    @property
-    def errors(self) -> Path:
-        return self.directory / "daemon.err"
-
-    def arguments(self, command: str) -> list[str]:
-        """What both commands have in common."""
-        clock = ["--at", utc_text(self.scene.start_tai_s, 6), "--at-monotonic", f"{self.at_monotonic_s:.6f}"]
-        return [*ACU_DAEMON, command, "--config", str(self.config), "--satellite", SATELLITE, *clock]
-
-    def start_acu(self, *more: str) -> None:
-        """Start the simulated ACU, wait until it listens, and write its URL into the daemon's configuration.
-
-        A second start takes the same place again.
-        """
-        where = ["--listen", self.url.removeprefix("tcp://") or "127.0.0.1:0"]
-        if self.link == "pty":
-            where = ["--pty", str((self.directory / "acu").absolute())]
-        files = ["--scenario", str(self.config / "scenario.toml"), "--trace", str(self.trace)]
-        files += ["--wire-log", str(self.wire_log)]
-        if self.scene.truth is not None:
-            files += ["--truth", str(self.scene.truth)]
-        with (self.directory / "acu.err").open("w") as errors:
-            self.acu = subprocess.Popen(
-                [*self.arguments("fake-acu"), *where, *files, *more], stdout=subprocess.PIPE, stderr=errors, text=True
-            )
-        said = self.acu.stdout.readline() if self.acu.stdout else ""
-        if not said.startswith("listening "):
-            raise BenchError(f"the simulated ACU did not start: {(self.directory / 'acu.err').read_text()}")
-        self.url = said.split()[1]
-        station = self.config / "station.toml"
-        station.write_text(station.read_text().replace("tcp://127.0.0.1:3842", self.url))
-
-    def start_daemon(self, *more: str) -> None:
-        """Start the daemon: its log goes to `log`, its complaints to `errors`."""
-        arguments = [*self.arguments("run"), "--state", str(self.directory / "state"), *more]
-        with self.log.open("w") as log, self.errors.open("w") as errors:
-            self.daemon = subprocess.Popen(arguments, stdout=log, stderr=errors, text=True)
-
-    def events(self, name: str) -> list[dict[str, Any]]:
-        """Lines of the daemon's log about one event."""
-        whole = [line for line in self.log.read_text().splitlines(keepends=True) if line.endswith("\n")]
-        return [entry for entry in map(json.loads, whole) if entry["event"] == name]
-
-    @property
-    def state(self) -> str:
-        """The daemon's present state."""
-        changes = self.events("state.changed")
-        return str(changes[-1]["state"]) if changes else "starting"
-
-    def stop(self) -> None:
-        """End both, the daemon first, so that its safe stop finds an ACU."""
-        for process in (self.daemon, self.acu):
-            if process is None:
-                continue
-            if process.poll() is None:
-                process.send_signal(signal.SIGTERM)
-            try:
-                process.wait(10.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-            if process.stdout is not None:
-                process.stdout.close()
-
-
-ACU_DAEMON = (sys.executable, "-m", "acu_daemon")
-
-
-@contextlib.contextmanager
-def rigs(scene: Scene, links: Sequence[str], directory: Path) -> Iterator[list[Rig]]:
-    """Rigs that share one clock; their processes end with the context."""
-    at_monotonic_s = time.monotonic() + LEAD_S
-    made = [Rig(link, scene, directory / link, at_monotonic_s) for link in links]
-    try:
-        yield made
-    finally:
-        for rig in made:
-            rig.stop()
-
-
-def run_pass(scene: Scene, links: Sequence[str], directory: Path, say: Callable[[str], None] = print) -> list[Rig]:
-    """Run the pass, or its window, on every link at once; the rigs' files hold what happened."""
-    with rigs(scene, links, directory) as made:
-        for rig in made:
-            rig.start_acu()
-        left_s = scene.end_tai_s - scene.start_tai_s + made[0].at_monotonic_s - time.monotonic()
-        for rig in made:
-            rig.start_daemon(*(["--duration", f"{left_s:.3f}"] if scene.is_window else []))
-        _watch(made, time.monotonic() + left_s, say)
-    return made
-
-
-def _watch(made: list[Rig], end_s: float, say: Callable[[str], None]) -> None:
-    said_s = -math.inf
-    while any(rig.daemon is not None and rig.daemon.poll() is None for rig in made):
-        now_s = time.monotonic()
-        if now_s - said_s >= SAY_EVERY_S:
-            said_s = now_s
-            say(f"SIMULATION  {max(0.0, end_s - now_s):4.0f} s left  " + "  ".join(f"{r.link} {r.state}" for r in made))
-        if now_s > end_s + 60.0:
-            raise BenchError("the daemon did not end with its pass")
-        time.sleep(0.25)
+MIN_WINDOW_S = 45.0
 
 
 @dataclass(frozen=True)
@@ -331,7 +61,7 @@ def measure(rig: Rig) -> Result:
     done = rig.events("run.done")
     if rig.daemon is None or not done:
         raise BenchError(f"{rig.link}: the daemon did not finish: {rig.errors.read_text().strip() or rig.state}")
-    station = load_target(rig.config, SATELLITE, rig.scene.start_tai_s).station
+    station = load_target(rig.config, rig.scene.satellite, rig.scene.start_tai_s).station
     limits = station.acu.azimuth.limits(), station.acu.elevation.limits()
     trace = read_trace(rig.trace)
     counts = {name: done[0][name] for name in Result.__dataclass_fields__ if name in done[0]}
@@ -426,7 +156,9 @@ def main() -> int:
     parser.add_argument("--out", type=Path, metavar="DIR", help="keep traces and logs here (a new directory)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures here")
     options = parser.parse_args()
-    pass_name = options.pass_name or (DEFAULT_PASS if PASSES.is_dir() else "demo")
+    if options.window is not None and not options.window >= MIN_WINDOW_S:
+        parser.error(f"--window {options.window:g}: expected at least {MIN_WINDOW_S:g} s, to lock, lose and relock")
+    pass_name = options.pass_name or (DEFAULT_PASS if pass_names() else "demo")
     links = LINKS if options.link == "both" else (options.link,)
     with tempfile.TemporaryDirectory(prefix="acu-daemon-bench-") as temporary:
         directory = options.out or Path(temporary) / "out"
@@ -439,6 +171,8 @@ def main() -> int:
         except (BenchError, AcuDaemonError, OSError) as error:
             print(f"bench_pass: {error}", file=sys.stderr)
             return 2
+        except KeyboardInterrupt:
+            return 130
     failed = missed(results)
     print("\n" + table(results))
     print("\nnot met: " + "; ".join(failed) if failed else "\nall asked figures are met")

@@ -26,7 +26,7 @@ from script_modules import load
 from acu_daemon.protocol.messages import Identify, Poll, ReadRegisters
 from acu_daemon.report.trace import read_trace
 
-bench_pass = load("bench_pass")
+bench_pass, pass_rig = load("bench_pass"), load("pass_rig")
 pytestmark = pytest.mark.realtime
 
 WINDOW_S = 60.0
@@ -39,12 +39,12 @@ ON_A_TERMINAL = (sys.executable, "-c", "import os, sys; os.login_tty(0); os.exec
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator["Future[dict[str, Any]]"]:
     """A window of a pass on both links at once."""
-    name = bench_pass.DEFAULT_PASS if bench_pass.PASSES.is_dir() else None
-    scene = bench_pass.make_scene(tmp_path_factory.mktemp("scene"), name, WINDOW_S)
+    name = pass_rig.DEFAULT_PASS if pass_rig.pass_names() else None
+    scene = pass_rig.make_scene(tmp_path_factory.mktemp("scene"), name, WINDOW_S)
     directory = tmp_path_factory.mktemp("bench")
 
     def run() -> dict[str, Any]:
-        ended = bench_pass.run_pass(scene, bench_pass.LINKS, directory, lambda _: None)
+        ended = pass_rig.run_pass(scene, pass_rig.LINKS, directory, lambda _: None)
         return {rig.link: bench_pass.measure(rig) for rig in ended}
 
     with ThreadPoolExecutor(1) as pool:
@@ -60,8 +60,8 @@ def _the_bench_begins_with_the_first_test(request: pytest.FixtureRequest) -> Non
 @pytest.fixture
 def rig(tmp_path: Path) -> Iterator[Any]:
     """A rig over TCP under two minutes of the demo's satellite; nothing is started yet."""
-    scene = bench_pass.make_scene(tmp_path / "scene", None, 120.0)
-    with bench_pass.rigs(scene, ["tcp"], tmp_path) as made:
+    scene = pass_rig.make_scene(tmp_path / "scene", None, 120.0)
+    with pass_rig.rigs(scene, ["tcp"], tmp_path) as made:
         yield made[0]
 
 
@@ -75,9 +75,7 @@ def wait_until(is_so: Callable[[], bool]) -> None:
 def silence(rig: Any) -> None:
     """No signal at all for the next simulated ACU."""
     scenario = rig.config / "scenario.toml"
-    scenario.write_text(
-        scenario.read_text() + '[[loss]]\ncause = "silence-zone"\nstart_s = 0.0\nduration_s = 1000.0\n'
-    )
+    scenario.write_text(scenario.read_text() + '[[loss]]\ncause = "silence-zone"\nstart_s = 0.0\nduration_s = 1000.0\n')
 
 
 def last_mode(rig: Any) -> str:
@@ -101,7 +99,7 @@ def test_sigterm_stops_the_antenna_and_the_recording_can_be_replayed(rig: Any, t
     assert last_mode(rig) == "STANDBY"
 
     replay = acu_daemon(
-        "replay", "--config", rig.config, "--satellite", "bench", "--readings", recording, "--out", replayed
+        "replay", "--config", rig.config, "--satellite", rig.scene.satellite, "--readings", recording, "--out", replayed
     )
     assert replay.code == 0, replay.err
     assert len(replayed.read_text().splitlines()) == len(recording.read_text().splitlines()) > 20

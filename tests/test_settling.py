@@ -10,18 +10,18 @@ from acu_daemon.cli.virtual_pass import fly
 from acu_daemon.control.lag import PRIOR_LAG_S
 from acu_daemon.sim.scenario import read_scenario
 
-bench_pass = load("bench_pass")
+pass_rig = load("pass_rig")
 BYTE_TIME_S = 10 / 9600
 MAX_ERROR_DEG = 0.1
 
 
 @needs_data
 def test_a_servo_that_takes_up_a_fast_path_is_not_taken_for_a_slow_one(tmp_path: Path) -> None:
-    scene = bench_pass.make_scene(tmp_path, bench_pass.DEFAULT_PASS, 60.0)
+    scene = pass_rig.make_scene(tmp_path, pass_rig.DEFAULT_PASS, 60.0)
     scenario = read_scenario(scene.config / "scenario.toml")
     (lost_at_tai_s, _), *_ = (loss.window_tai_s(scene.start_tai_s) for loss in scenario.losses)
     flight = fly(
-        load_target(scene.config, bench_pass.SATELLITE, scene.start_tai_s),
+        load_target(scene.config, scene.satellite, scene.start_tai_s),
         scene.truth,
         scenario,
         begin_tai_s=scene.start_tai_s,
