@@ -60,8 +60,7 @@ def sigma_deg(propagator: Propagator, tai_s: Array, site: Site, fit: FitResult |
         return None
     first, last = float(tai_s[0]), float(tai_s[-1])
     times = np.linspace(first, last, 2 + int((last - first) / _SIGMA_STEP_S))
-    across, both, upward = sky_covariance(propagator, times, site, fit)
-    del both
+    across, _, upward = sky_covariance(propagator, times, site, fit)
     sigma: Array = np.interp(tai_s, times, np.sqrt((across + upward) / 2.0)) / DEG
     return sigma
 

@@ -72,14 +72,17 @@ def path_itrs(source: Propagator, x: Array, site: Site, node_tai_s: Array) -> Cu
 
 
 def orbit_partials_itrs(source: Propagator, x: Array, site: Site, node_tai_s: Array) -> Curve:
-    """What a unit of each of the six corrections moves, (6, K, 3), by central differences about x."""
+    """What a unit of each of the six corrections moves, (6, K, 3), by differences from x.
+
+    One-sided: the steps are so small that the curvature is a 1e-5th, which only the direction of a sweep sees.
+    """
+    r0_m, v0_m_s = source.corrected(correction_of(x)).states_teme(node_tai_s)
     r_m, v_m_s = np.empty((2, ORBIT_COUNT, node_tai_s.size, 3))
     for k, step in enumerate(STEPS):
-        h = np.zeros(STATE_COUNT)
-        h[k] = step
-        ahead = source.corrected(correction_of(x + h)).states_teme(node_tai_s)
-        behind = source.corrected(correction_of(x - h)).states_teme(node_tai_s)
-        r_m[k], v_m_s[k] = ((a - b) / (2.0 * step) for a, b in zip(ahead, behind, strict=True))
+        moved = x.copy()
+        moved[k] += step
+        r1_m, v1_m_s = source.corrected(correction_of(moved)).states_teme(node_tai_s)
+        r_m[k], v_m_s[k] = (r1_m - r0_m) / step, (v1_m_s - v0_m_s) / step
     times = np.tile(node_tai_s, ORBIT_COUNT)
     turned = itrs_from_teme(r_m.reshape(-1, 3), v_m_s.reshape(-1, 3), times, site.orientation)  # linear in both
     value, rate = (one.reshape(ORBIT_COUNT, -1, 3) for one in turned)

@@ -19,8 +19,9 @@ from acu_daemon.units import DAY_S, DEG, Array
 ORBIT_COUNT = 6
 STATE_COUNT = 13
 ORBIT, BIAS, STATION = slice(0, 6), slice(6, 10), slice(10, 13)
-STEPS = (1e-5, 1e-5, 1e-9, 1e-5, 1e-5, 1e-5)  # for differences: some 70 m each, 100 m after a day for the mean motion
+STEPS = (1e-5, 1e-5, 1e-10, 1e-5, 1e-5, 1e-5)  # for differences: some 70 m each; 60 m after a day for the mean motion
 
+BROUWER_SIGMAS = StateSigmas(3e3, 3.0)  # after some weeks, seed 002, 5.3
 _UP_SHARE = 0.1  # coordinates are rounded in latitude and longitude; heights are known much better
 
 
@@ -63,13 +64,13 @@ def states_of(correction: Correction, bias: AngleBias, shift_enu_m: tuple[float,
 
 
 def make_prior(source: Propagator, settings: EstimatorSettings, at_tai_s: float) -> Prior:
-    """What is known before the first reading, at at_tai_s; the orbit's by its age where the settings name no sigmas."""
+    """What is known before the first reading, at at_tai_s; of the orbit, from kind and age unless the settings say."""
     covariance = np.zeros((STATE_COUNT, STATE_COUNT))
-    sigmas = settings.orbit_sigmas
+    sigmas = settings.orbit_sigmas or (BROUWER_SIGMAS if source.kind == "brouwer" else ElementSigmas())
     if isinstance(sigmas, StateSigmas):
         covariance[ORBIT, ORBIT] = _orbit_covariance_of_state(source, sigmas)
     else:
-        covariance[ORBIT, ORBIT] = _orbit_covariance(sigmas or ElementSigmas(), abs(at_tai_s - source.epoch_tai_s))
+        covariance[ORBIT, ORBIT] = _orbit_covariance(sigmas, abs(at_tai_s - source.epoch_tai_s))
     bias_deg = (
         settings.bias_sigma_azimuth_deg,
         settings.bias_sigma_azimuth_sec_deg,
