@@ -32,7 +32,6 @@ from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 from acu_daemon.protocol.exchange import HostExchange
 from acu_daemon.protocol.messages import AcuMode, Backup, Command, Poll, SelectBackup, SelectMode
 from acu_daemon.protocol.sa3842 import DEFAULT_ADDRESS
-from acu_daemon.report.plot import plot_passes
 from acu_daemon.report.trace import Figures, measure, read_trace
 from acu_daemon.sim.build import make_sky
 from acu_daemon.sim.scenario import Loss, read_scenario
@@ -202,6 +201,8 @@ async def _rate_memory(url: str) -> None:
 
 
 def _report(out: Path) -> Figures:
+    from acu_daemon.report.plot import plot_passes  # matplotlib is slow to load, and no other command needs it
+
     traces = {"assisted": read_trace(out / "assisted.csv"), "rate memory": read_trace(out / "rate-memory.csv")}
     figures = {label: measure(trace, beamwidth_deg=1.0) for label, trace in traces.items()}
     first = traces["assisted"]
