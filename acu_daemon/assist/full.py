@@ -3,8 +3,9 @@
 import numpy as np
 
 from acu_daemon.assist.base import BaseEstimator
-from acu_daemon.assist.full_solve import Sights, Solution, sights, solve
-from acu_daemon.assist.full_states import Prior, bias_of, correction_of, make_prior, shift_of
+from acu_daemon.assist.full_points import Sights, sights
+from acu_daemon.assist.full_solve import Problem, Solution, solve
+from acu_daemon.assist.full_states import bias_of, correction_of, make_prior, shift_of
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import Correction, FitResult, Readings, Site
 from acu_daemon.orbit.frames import station_itrs_m, teme_from_itrs
@@ -21,14 +22,15 @@ class FullEstimator(BaseEstimator):
 
     def __init__(self, propagator: Propagator, site: Site, settings: EstimatorSettings) -> None:
         super().__init__(propagator, site, settings)
-        self._prior: Prior | None = None
+        self._problem: Problem | None = None
         self._parts: list[Sights] = []
         self._solution: Solution | None = None
         self._is_new = False
 
     def _use(self, readings: Readings) -> list[str | None]:
-        if self._prior is None:
-            self._prior = make_prior(self._source, self._settings, float(readings.tai_s[0]))
+        if self._problem is None:
+            prior = make_prior(self._source, self._settings, float(readings.tai_s[0]))
+            self._problem = Problem(self._source, self._site, self._settings, prior)
         self._parts.append(sights(readings))
         self._is_new = True
         return [None] * len(readings)
@@ -41,18 +43,18 @@ class FullEstimator(BaseEstimator):
 
         Raises:  OrbitError: the source has no answer for one of the readings' times.
         """
-        if self._prior is None:
+        if self._problem is None:
             return None
         seen = _joined(self._parts)
         self._parts = [seen]
         if self._is_new or self._solution is None:
-            self._solution = solve(self._source, self._site, self._settings, self._prior, seen, self._solution)
+            self._solution = solve(self._problem, seen, self._solution)
             self._is_new = False
         return self._result(self._solution, float(seen.tai_s[-1]))
 
     def _result(self, solution: Solution, at_tai_s: float) -> FitResult:
         left_out = int(np.count_nonzero(solution.weights == 0.0))
-        newest = solution.residuals_rad[-_NEWEST_COUNT:]
+        newest = solution.left.off_rad[-_NEWEST_COUNT:]
         correction = correction_of(solution.x)
         along_s, across_deg = shift_for_people(self._source, correction, at_tai_s, self._site)
         return FitResult(
