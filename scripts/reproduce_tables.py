@@ -23,6 +23,7 @@ from pathlib import Path
 import numpy as np
 from tables.bound import bounds_deg
 from tables.charts import plot_figures_5, plot_rows
+from tables.console import progress, say
 from tables.errors_put_in import draw_errors
 from tables.methods import IN_TABLE, METHODS
 from tables.rows import Row, rows_of, table_text
@@ -72,21 +73,6 @@ def reproduce(passes: tuple[SeedPass, ...], methods: tuple[str, ...], run_count:
         eps_deg = {name: np.array([run for chunk in chunks for run in chunk[name]]) for name in methods}
         rows += rows_of(true_pass, eps_deg, bounds_deg(true_pass, np.random.default_rng(seed)))
     return rows
-
-
-def say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
-
-
-def progress(done: int, total: int) -> None:
-    """One line on standard error, redrawn on a terminal, every tenth elsewhere."""
-    width = 40
-    filled = width * done // total
-    bar = f"[{'#' * filled}{'.' * (width - filled)}] {done}/{total}"
-    if sys.stderr.isatty():
-        print(f"\r{bar}", end="\n" if done == total else "", file=sys.stderr, flush=True)
-    elif done == total or done * 10 // total != (done - 1) * 10 // total:
-        say(bar)
 
 
 def options() -> argparse.Namespace:

@@ -68,8 +68,6 @@ def plot_figures_5(path: Path, true_pass: TruePass, curves: Curves, used_s: int)
     for axes, what in zip(grid[:, 0], ("eps", "error in azimuth", "error in elevation"), strict=True):
         axes.set_ylabel(f"{what}, degrees")
     grid[0, 0].set_ylim(0.0, 1.2)
-    grid[1, 0].set_ylim(-1.2, 1.2)
-    grid[2, 0].set_ylim(-1.2, 1.2)
     for axes in grid[-1]:
         axes.set_xlabel("minutes since 5° of elevation")
     grid[0, -1].legend(loc="upper right", frameon=False, fontsize=8)

@@ -3,7 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from acu_daemon.assist.settings import SEED, EstimatorSettings
+from acu_daemon.assist.estimator import ESTIMATORS
+from acu_daemon.assist.settings import SEED, EstimatorSettings, StateSigmas
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import Array
 from tables.errors_put_in import taken_as_mean, turned_to_mean
@@ -20,10 +21,20 @@ class Method:
 
 # Seed 002, 5.3; every reading is used, as the papers have no gate.
 _AS_PUBLISHED = EstimatorSettings(0.1, 0.1, max_fit_elevation_deg=90.0, beamwidth_deg=20.0, kalman=SEED)
-_TODAY = EstimatorSettings(0.06, 0.1, max_fit_elevation_deg=90.0)
+# What an operator knows: the noise, how good the elements are (5.3) and that the station is rounded.
+_TODAY = EstimatorSettings(
+    0.06,
+    0.05,
+    max_fit_elevation_deg=90.0,
+    sigma_elevation_cot_deg=0.01,
+    orbit_sigmas=StateSigmas(3e3, 3.0),
+    station_sigma_m=6e3,
+)
+FULL = "six" if "six" in ESTIMATORS else "full"
 
 METHODS = {
-    "full": Method("full", _TODAY, turned_to_mean),
+    "full": Method(FULL, _TODAY, turned_to_mean),
+    "full-as-mean": Method(FULL, _TODAY, taken_as_mean),
     "deterministic": Method("deterministic", _AS_PUBLISHED, taken_as_mean),
     "kalman": Method("kalman", _AS_PUBLISHED, taken_as_mean),
     "circular": Method("circular", _AS_PUBLISHED, taken_as_mean),

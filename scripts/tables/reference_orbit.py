@@ -74,16 +74,21 @@ class TabulatedOrbit:
 
 
 def integrate(orbit: OrbitAtEpoch, span_s: float, step_s: float = TABLE_STEP_S) -> TabulatedOrbit:
-    """Integrate an orbit over a span from its epoch on.
+    """Integrate an orbit over a span from its epoch on."""
+    return integrate_state(orbit.epoch_utc, np.concatenate(orbit.state_teme()), span_s, step_s)
+
+
+def integrate_state(epoch_utc: str, state_teme: Array, span_s: float, step_s: float = TABLE_STEP_S) -> TabulatedOrbit:
+    """Integrate a state, (6,) in m and m/s, over a span from its epoch on.
 
     Earth orientation is left out (UT1 = UTC, no polar motion), as it is for the estimators.
     """
     import brahe
 
     brahe.set_global_eop_provider_from_static_provider(brahe.StaticEOPProvider.from_zero())
-    epoch_tai_s = tai_from_utc(orbit.epoch_utc)
-    epoch = brahe.Epoch(orbit.epoch_utc)
-    itrf = brahe.state_teme_to_itrf(epoch, np.concatenate(orbit.state_teme()))
+    epoch_tai_s = tai_from_utc(epoch_utc)
+    epoch = brahe.Epoch(epoch_utc)
+    itrf = brahe.state_teme_to_itrf(epoch, state_teme)
     value = brahe.ParameterSource.value
     forces = brahe.ForceModelConfig(
         gravity=brahe.GravityConfiguration.spherical_harmonic(ZONAL_DEGREE, TESSERAL_ORDER),

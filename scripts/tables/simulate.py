@@ -3,6 +3,7 @@
 import numpy as np
 
 from acu_daemon.assist.estimator import make_estimator
+from acu_daemon.assist.full_path import moved_site
 from acu_daemon.model import FitResult, Readings, Site
 from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.propagator import Propagator
@@ -49,8 +50,11 @@ def direction_errors_deg(
 
 
 def predicted_deg(source: Propagator, fit: FitResult | None, tai_s: Array, site: Site) -> tuple[Array, Array]:
-    """Direction of the satellite, without encoder bias, from the newest fit."""
-    seen = look_at(source if fit is None else source.corrected(fit.correction), tai_s, site)
+    """True direction of the satellite, without encoder bias, as the newest fit has orbit and station."""
+    if fit is None:
+        seen = look_at(source, tai_s, site)
+    else:
+        seen = look_at(source.corrected(fit.correction), tai_s, moved_site(site, fit.station_shift_enu_m))
     return seen.az_deg, seen.el_deg
 
 

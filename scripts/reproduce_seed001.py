@@ -1,0 +1,140 @@
+#!/usr/bin/env python3
+"""The simulations of seed 001, 2.4, run again on an integrated Landsat-4-like orbit.
+
+    .venv/bin/python scripts/reproduce_seed001.py               tables on standard output
+    .venv/bin/python scripts/reproduce_seed001.py --plots DIR   figures 2.1 and 2.2, and the sensitivity of 2.4.3
+
+Losses at every elevation of 32 passes (highest elevations from 10 to 89.9 degrees, four directions of the perigee).
+Errors are angles on the sky.  It needs brahe: pip install -c constraints.txt '.[accuracy]'
+"""
+
+import argparse
+import multiprocessing
+import os
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+from tables.charts_seed_001 import plot_losses, plot_sensitivity
+from tables.console import progress, say
+from tables.landsat import PERIGEES_DEG, LandsatPass, landsat_passes
+from tables.seed_001 import (
+    A_ERRORS_KM,
+    EXPERIMENTS,
+    I_ERRORS_DEG,
+    LIMIT_DEG,
+    SENSITIVE,
+    Experiment,
+    LossTrial,
+    loss_trials,
+    verdict,
+    where_beyond,
+)
+
+LOSS_STEP_S, SENSITIVITY_STEP_S = 10, 40
+SEED = 1982
+BANDS_DEG = (5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 80.0, 90.0)
+
+
+def try_all(
+    pool: ProcessPoolExecutor, passes: Sequence[LandsatPass], experiments: Sequence[Experiment], step_s: int
+) -> list[list[LossTrial]]:
+    """Try every experiment on every pass; the losses of each experiment."""
+    jobs = [(experiment, one, k) for experiment in experiments for k, one in enumerate(passes)]
+    steps = [step_s] * len(jobs)
+    found: list[list[LossTrial]] = [[] for _ in experiments]
+    for count, trials in enumerate(pool.map(_try_one, jobs, steps), 1):
+        found[(count - 1) // len(passes)] += trials
+        progress(count, len(jobs))
+    return found
+
+
+def _try_one(job: tuple[Experiment, LandsatPass, int], step_s: int) -> list[LossTrial]:
+    experiment, one, number = job
+    return loss_trials(one, experiment, step_s, np.random.default_rng((SEED, number)))
+
+
+def losses(pool: ProcessPoolExecutor, passes: list[LandsatPass]) -> dict[str, list[LossTrial]]:
+    """2.4.1: print the table, and give the losses."""
+    say("losses at every elevation")
+    found = try_all(pool, passes, EXPERIMENTS, LOSS_STEP_S)
+    names = (
+        "method",
+        f"s until {LIMIT_DEG:g}°, shortest",
+        "the same, lost above 80°",
+        "worst within 10 s, lost above 80°",
+        "worst over a pass",
+        f"losses that leave {LIMIT_DEG:g}°",
+    )
+    print("| " + " | ".join(names) + " |\n" + "|---" * len(names) + "|")
+    for experiment, trials in zip(EXPERIMENTS, found, strict=True):
+        one = verdict(trials)
+        cells = (
+            experiment.name,
+            _seconds(one.seconds_within),
+            _seconds(one.seconds_within_overhead),
+            f"{one.worst_at_10_s_overhead_deg:.3f}",
+            f"{one.worst_deg:.2f}",
+            f"{one.beyond_count} of {one.trial_count}",
+        )
+        print("| " + " | ".join(cells) + " |")
+    _print_where(dict(zip((one.name for one in EXPERIMENTS), found, strict=True)))
+    return {experiment.name: trials for experiment, trials in zip(EXPERIMENTS, found, strict=True)}
+
+
+def _print_where(trials: dict[str, list[LossTrial]]) -> None:
+    """Where `full` leaves the limit: by the elevation at the loss."""
+    for name in (name for name in trials if name.startswith("full")):
+        print(f"\n{name}: losses that leave {LIMIT_DEG:g}°, by the elevation at the loss (rising), and the worst error")
+        bands = where_beyond(trials[name], BANDS_DEG)
+        print("| " + " | ".join(band for band, *_ in bands) + " |\n" + "|---" * len(bands) + "|")
+        print("| " + " | ".join(f"{beyond} of {count}, {worst:.2f}°" for _, beyond, count, worst in bands) + " |")
+    print()
+
+
+def sensitivity(pool: ProcessPoolExecutor, passes: list[LandsatPass]) -> dict[str, tuple[list[float], list[float]]]:
+    """2.4.3: print the table, and give the worst errors of each method against the errors of a and i."""
+    say("sensitivity to errors of a and i")
+    result = {}
+    names = [*(f"a {error:+g} km" for error in A_ERRORS_KM), *(f"i {error:+g}°" for error in I_ERRORS_DEG)]
+    print("| worst over a pass | " + " | ".join(names) + " |\n" + "|---" * (len(names) + 1) + "|")
+    for method in SENSITIVE:
+        cases = [replace(method, d_a_km=error) for error in A_ERRORS_KM]
+        cases += [replace(method, d_i_deg=error) for error in I_ERRORS_DEG]
+        worst = [verdict(trials).worst_deg for trials in try_all(pool, passes, cases, SENSITIVITY_STEP_S)]
+        print(f"| {method.name} | " + " | ".join(f"{value:.3f}" for value in worst) + " |", flush=True)
+        result[method.name] = (worst[: len(A_ERRORS_KM)], worst[len(A_ERRORS_KM) :])
+    return result
+
+
+def _seconds(value: float) -> str:
+    return f"{value:.0f}" if np.isfinite(value) else "never"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--plots", type=Path, metavar="DIR", help="draw the figures there")
+    chosen = parser.parse_args()
+    if find_spec("brahe") is None:
+        say("the reference orbit needs brahe: pip install -c constraints.txt '.[accuracy]'")
+        return 2
+    say("integrating the orbit and placing the stations")
+    passes = landsat_passes()
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # for the processes to come: one each is enough
+    with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
+        found = losses(pool, passes)
+        perigees = len(passes) // len(PERIGEES_DEG)
+        worst = sensitivity(pool, passes[:perigees] + passes[2 * perigees : 3 * perigees])
+    if chosen.plots:
+        chosen.plots.mkdir(parents=True, exist_ok=True)
+        plot_losses(chosen.plots / "seed-001-losses.png", found)
+        plot_sensitivity(chosen.plots / "seed-001-sensitivity.png", worst)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
