@@ -21,7 +21,13 @@ STATE_COUNT = 13
 ORBIT, BIAS, STATION = slice(0, 6), slice(6, 10), slice(10, 13)
 STEPS = (1e-5, 1e-5, 1e-10, 1e-5, 1e-5, 1e-5)  # for differences: some 70 m each; 60 m after a day for the mean motion
 
-BROUWER_SIGMAS = StateSigmas(3e3, 3.0)  # after some weeks, seed 002, 5.3
+BROUWER_SIGMAS = ElementSigmas(  # no long-period terms (1 to 2 km) and no drag
+    raan_deg=0.03,
+    mean_motion_rad_min=5e-6,
+    mean_motion_per_day_rad_min=2e-6,
+    e_vector=2e-4,
+    inclination_deg=0.02,
+)
 _UP_SHARE = 0.1  # coordinates are rounded in latitude and longitude; heights are known much better
 
 
