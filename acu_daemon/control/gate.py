@@ -5,7 +5,7 @@ are clamped to what the axis can do; registers it does not follow hold the true 
 """
 
 from dataclasses import dataclass, replace
-from math import isfinite
+from math import copysign, cos, isfinite, radians
 
 from acu_daemon.control.state import ControlConfig, ControlState
 from acu_daemon.model import AxisLimits, Pointing
@@ -16,10 +16,12 @@ LIMIT_SLACK_DEG = 0.1  # noise of a reading at a limit is clamped; more than tha
 PATH_MARGIN = 0.98  # of the drive's limits, on the path: the time between two writes is only nominally the period
 NEAR_DEG, NEAR_DEG_S = 0.5, 2.0  # nearer than this to the path in angle and rate is on it
 CHASE_RATE_MARGIN = 0.9  # while it chases the path: an antenna that fell behind must be able to catch up,
-CHASE_ACCELERATION_MARGIN = 0.6  # and must meet the path slowly enough for autotrack to take over (decision 0020)
+CHASE_ACCELERATION_MARGIN = 0.6  # and must not stay behind its registers all the way (decision 0020)
+ENTRY_S = 1.2  # where the satellite enters the beam, autotrack takes over: half a beam in no less time than this
 STRAY_DEG = 0.5  # an antenna this far from the register it is about to follow starts from where it is
 WINDUP_DEG = 10.0  # a followed register may lead the antenna by this and WINDUP_S of the motion, else starts anew
 WINDUP_S = 0.2
+LEAST_COS_EL = 0.01
 FRESH_S = 1.0  # readings older than this say nothing about the present rate
 
 
@@ -46,8 +48,10 @@ def gate(
         AxisState(wanted.el_deg, wanted.el_rate_deg_s),
     )
     if is_followed:
-        new_az = _reachable(az, new_az, dt_s, config.azimuth)
-        new_el = _reachable(el, new_el, dt_s, config.elevation)
+        half_beam_deg = config.beamwidth_deg / 2
+        half_beam_az_deg = half_beam_deg / max(cos(radians(wanted.el_deg)), LEAST_COS_EL)
+        new_az = _reachable(az, new_az, dt_s, config.azimuth, half_beam_az_deg)
+        new_el = _reachable(el, new_el, dt_s, config.elevation, half_beam_deg)
     is_held_back = new_az.position_deg != wanted.az_deg or new_el.position_deg != wanted.el_deg
     return Passed(_legal(new_az, config.azimuth), _legal(new_el, config.elevation), is_held_back)
 
@@ -96,16 +100,30 @@ def _anchor(last: AxisState | None, antenna: AxisState, *, begins: bool, is_foll
     return last
 
 
-def _reachable(start: AxisState, wanted: AxisState, dt_s: float, limits: AxisLimits) -> AxisState:
-    """On the path: all that the drive can do.  Off it: a chase that the antenna can follow easily."""
+def _reachable(start: AxisState, wanted: AxisState, dt_s: float, limits: AxisLimits, half_beam_deg: float) -> AxisState:
+    """On the path: all that the drive can do.  Off it: a chase that the antenna can follow easily.
+
+    half_beam_deg: in degrees of this axis.  An axis that moves away from the path brakes with all it has.
+    """
     on_path = _share(limits, PATH_MARGIN, PATH_MARGIN)
     reached = step(start, wanted.position_deg, wanted.rate_deg_s, dt_s, on_path)
     is_near = abs(reached.position_deg - wanted.position_deg) < NEAR_DEG
     if is_near and abs(reached.rate_deg_s - wanted.rate_deg_s) < NEAR_DEG_S:
         return reached
-    chase = _share(limits, CHASE_RATE_MARGIN, CHASE_ACCELERATION_MARGIN)
+    gap_deg = wanted.position_deg - start.position_deg
+    is_leaving = (start.rate_deg_s - wanted.rate_deg_s) * gap_deg < 0.0
+    chase = _share(limits, CHASE_RATE_MARGIN, PATH_MARGIN if is_leaving else CHASE_ACCELERATION_MARGIN)
+    aim_deg = wanted.position_deg
+    if abs(gap_deg) > half_beam_deg:
+        aim_deg -= copysign(_short_deg(half_beam_deg, chase.max_acceleration_deg_s2), gap_deg)
     bounded = replace(start, rate_deg_s=min(max(start.rate_deg_s, -chase.max_rate_deg_s), chase.max_rate_deg_s))
-    return step(bounded, wanted.position_deg, wanted.rate_deg_s, dt_s, chase)
+    return step(bounded, aim_deg, wanted.rate_deg_s, dt_s, chase)
+
+
+def _short_deg(half_beam_deg: float, acceleration_deg_s2: float) -> float:
+    """How far short of the path to aim, so that a braking axis enters the beam with half a beam in ENTRY_S."""
+    entry_deg_s = half_beam_deg / ENTRY_S
+    return max(half_beam_deg - entry_deg_s**2 / 2.0 / acceleration_deg_s2, 0.0)
 
 
 def _share(limits: AxisLimits, rate: float, acceleration: float) -> AxisLimits:
