@@ -145,6 +145,20 @@ def test_lost_over_the_zenith_the_beam_stays_within_the_keyhole_plan(late_s: flo
     assert az_deg_s <= AZ_RATE_DEG_S
 
 
+@pytest.mark.parametrize(("raan_deg", "late_s"), [(0.035, -0.6), (0.035, 0.4), (-0.01, -0.6)])
+def test_autotrack_that_loses_the_satellite_at_the_zenith_is_given_it_back_once_and_keeps_it(
+    raan_deg: float, late_s: float
+) -> None:
+    """Nothing fails but the azimuth drive; a chase that enters the beam too fast would be lost again and again."""
+    errors = SkyErrors(along_track_s=late_s, delta_raan_deg=raan_deg)
+    antenna = AcuChoice(azimuth_deg=165.0, elevation_deg=72.0)
+    flight = flight_of(demo_target(), DEMO_TAI_S + 20.0, 65.0, antenna=antenna, errors=errors)
+    rows = rows_between(flight, DEMO_TAI_S + 35.0, DEMO_TAI_S + 85.0)
+    assert sum((row.beam_error_deg or 0.0) > HALF_BEAM_DEG for row in rows) * 0.1 < 11.0
+    assert flight.states().count("HOLD/FITTED") <= 2
+    assert flight.states()[-1] == "AUTOTRACK/FITTED"
+
+
 def worst_of_the_plan_deg(target: Target, errors: SkyErrors) -> float:
     """The best that the azimuth drive can do on the true path: the keyhole plan of the truth itself."""
     sky = sky_of(target, errors)
