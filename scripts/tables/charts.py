@@ -12,6 +12,7 @@ from tables.rows import Row
 from tables.true_pass import TruePass
 
 COLOURS = {"full": "#0b6e4f", "deterministic": "#c8553d", "kalman": "#3d7ea6", "circular": "#8a6fb0"}
+_OTHER = "#7a8794"
 _SEED_MARKS = {"deterministic": ("deterministic_deg", "D"), "kalman": ("kalman_deg", "s")}
 Curves = dict[str, list[tuple[Array, Array]]]
 
@@ -27,8 +28,8 @@ def plot_rows(path: Path, rows: list[Row], methods: tuple[str, ...], run_count: 
         for lane, name in zip(lanes, methods, strict=True):
             one, y = row.methods[name], k + lane
             label = f"{name}: median, 5-95 % of {run_count} runs" if k == 0 else None
-            axes.plot([one.p05_deg, one.p95_deg], [y, y], color=COLOURS[name], linewidth=3.5, alpha=0.45)
-            axes.plot(one.median_deg, y, "o", color=COLOURS[name], markersize=5, label=label)
+            axes.plot([one.p05_deg, one.p95_deg], [y, y], color=COLOURS.get(name, _OTHER), linewidth=3.5, alpha=0.45)
+            axes.plot(one.median_deg, y, "o", color=COLOURS.get(name, _OTHER), markersize=5, label=label)
             if name in _SEED_MARKS:
                 figure_name, marker = _SEED_MARKS[name]
                 label = f"{name}, as the paper prints" if k == 0 else None

@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 from tables.seed_001 import A_ERRORS_KM, I_ERRORS_DEG, LIMIT_DEG, LossTrial
 
-_COLOURS = ("#c8553d", "#e0a13a", "#8a6fb0", "#3d7ea6", "#0b6e4f", "#111111")
-_STYLES = ("-", "-", "-", "-", "-", "--")
+_COLOURS = ("#c8553d", "#e0a13a", "#8a6fb0", "#3d7ea6", "#0b6e4f", "#111111", "#7a8794")
+_STYLES = ("-", "-", "-", "-", "-", "--", "--")
 _FLOOR_DEG = 1e-3
 _OVERHEAD_PASS_DEG = 84.0
 

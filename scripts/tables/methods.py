@@ -1,7 +1,7 @@
 """The methods that the tables compare: an estimator, its settings, and what it makes of the corrupted state."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from acu_daemon.assist.estimator import ESTIMATORS
 from acu_daemon.assist.settings import SEED, EstimatorSettings, StateSigmas
@@ -22,7 +22,7 @@ class Method:
 # Seed 002, 5.3; every reading is used, as the papers have no gate.
 _AS_PUBLISHED = EstimatorSettings(0.1, 0.1, max_fit_elevation_deg=90.0, beamwidth_deg=20.0, kalman=SEED)
 # What an operator knows: the noise, how good the elements are (5.3) and that the station is rounded.
-_TODAY = EstimatorSettings(
+_TODAY_PLAIN = EstimatorSettings(
     0.06,
     0.05,
     max_fit_elevation_deg=90.0,
@@ -30,10 +30,19 @@ _TODAY = EstimatorSettings(
     orbit_sigmas=StateSigmas(3e3, 3.0),
     station_sigma_m=6e3,
 )
+# ... and the shape of the encoders' bias (eqs 24, 25): a constant part, and one with 1 / cos h and cot h.
+_TODAY = replace(
+    _TODAY_PLAIN,
+    bias_sigma_azimuth_deg=0.1,
+    bias_sigma_azimuth_sec_deg=0.01,
+    bias_sigma_elevation_deg=0.1,
+    bias_sigma_elevation_cot_deg=0.01,
+)
 FULL = "six" if "six" in ESTIMATORS else "full"
 
 METHODS = {
     "full": Method(FULL, _TODAY, turned_to_mean),
+    "full-default-bias": Method(FULL, _TODAY_PLAIN, turned_to_mean),
     "full-as-mean": Method(FULL, _TODAY, taken_as_mean),
     "deterministic": Method("deterministic", _AS_PUBLISHED, taken_as_mean),
     "kalman": Method("kalman", _AS_PUBLISHED, taken_as_mean),

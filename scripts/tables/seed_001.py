@@ -39,6 +39,9 @@ class Experiment:
 _NOISE_DEG = 0.05
 _PUBLISHED = EstimatorSettings(_NOISE_DEG, _NOISE_DEG, _EVERY_READING, inversion_count=3)
 _TODAY = EstimatorSettings(_NOISE_DEG, _NOISE_DEG, _EVERY_READING, orbit_sigmas=ElementSigmas())
+_TODAY_CALIBRATED = replace(
+    _TODAY, bias_sigma_azimuth_deg=0.01, bias_sigma_azimuth_sec_deg=0.0, bias_sigma_elevation_deg=0.01
+)
 J2_DISTANCE_KM = 4.4  # by so much the mean distance of this orbit is above its mean semi-major axis
 AS_PUBLISHED = Experiment("circular, sphere of the mean a", "circular", _PUBLISHED, 3.0, 1.0, 0.0, True)
 AS_DAEMON = Experiment("circular, sphere from the source", "circular", _TODAY, 3.0, 1.0, 0.0, False)
@@ -64,6 +67,7 @@ EXPERIMENTS = (
     ),
     replace(FULL_10_S, name="full, 10 s lock, 0.05° noise"),
     replace(with_old_elements(FULL_10_S), name="full, 10 s lock, 0.05° noise, old elements"),
+    replace(with_old_elements(FULL_10_S), name="full, the same, encoders good to 0.01°", settings=_TODAY_CALIBRATED),
 )
 SENSITIVE = (AS_PUBLISHED, AS_DAEMON, FULL_10_S)
 A_ERRORS_KM = (0.0, 0.05, 0.2, 1.0, 2.5, 5.0)  # seed 001, 2.4.3: 0.05 km and 0.001 deg a day, a hundred times that
