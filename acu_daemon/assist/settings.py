@@ -32,12 +32,12 @@ class ElementSigmas:
     The mean motion's grows with the age of the elements.  e_vector: each of e cos argp and e sin argp.
     """
 
-    raan_deg: float = 0.01
+    raan_deg: float = 0.02
     mean_anomaly_deg: float = 1.0
     mean_motion_rad_min: float = 5e-7
     mean_motion_per_day_rad_min: float = 1e-6
     e_vector: float = 4e-5
-    inclination_deg: float = 0.005
+    inclination_deg: float = 0.007
 
 
 @dataclass(frozen=True, slots=True)
