@@ -10,6 +10,7 @@ from acu_daemon.protocol.messages import AcuMode, Status
 LINK_SILENCE_S = 0.5  # ICD section 1
 ACQUIRE_LEAD_S = 20.0  # autotrack may be selected this long before the rise
 ON_POINT_BEAMS = 0.25
+RESUME_DEG = 5.0  # an antenna this near to the path goes on from an interruption without a new approach
 MODE_SETTLE_S = 3.0  # a MODE SELECT takes a moment to show; only later is a left mode the ACU's own doing
 
 
@@ -72,13 +73,24 @@ def _of_plan(state: ControlState, status: Status, sky: Sky, now_tai_s: float, co
     if sky.prediction is not None and now_tai_s >= plan.rise_tai_s - config.preposition_s:
         causes.add(Cause.PASS_NEAR)
     target = path_point(sky, now_tai_s)
-    if (
-        target is not None
-        and status.mode is AcuMode.REMOTE
-        and now_tai_s >= plan.rise_tai_s - ACQUIRE_LEAD_S
-        and _distance_deg(state, target) < ON_POINT_BEAMS * config.beamwidth_deg
-    ):
-        causes.add(Cause.ON_POINT)
+    if target is not None and now_tai_s >= plan.rise_tai_s - ACQUIRE_LEAD_S:
+        causes |= _of_place(state, status, sky, target, config)
+    return causes
+
+
+def _of_place(state: ControlState, status: Status, sky: Sky, target: Pointing, config: ControlConfig) -> set[Cause]:
+    """How near the antenna is to the path, once a signal may come."""
+    has_fit = sky.prediction is not None and sky.prediction.kind == "FITTED"
+    distance_deg = _distance_deg(state, status, target)
+    is_on_turn = abs(state.az_deg - target.az_deg) < 90.0  # not the same bearing on another turn of the wrap
+    causes: set[Cause] = set()
+    if status.mode is AcuMode.REMOTE and is_on_turn and distance_deg < ON_POINT_BEAMS * config.beamwidth_deg:
+        causes.add(Cause.ON_POINT_FITTED if has_fit else Cause.ON_POINT)
+    if distance_deg < RESUME_DEG:
+        if has_fit:
+            causes.add(Cause.STILL_FITTED)
+        if status.is_autotrack_selected and status.follows_registers:
+            causes.add(Cause.STILL_SELECTED)
     return causes
 
 
@@ -91,13 +103,10 @@ def path_point(sky: Sky, tai_s: float, *, follow: bool = True) -> Pointing | Non
     return None
 
 
-def _distance_deg(state: ControlState, target: Pointing) -> float:
-    if state.status is None:
-        return 180.0
-    if abs(state.az_deg - target.az_deg) > 90.0:  # the same bearing on another turn of the wrap is not there yet
-        return 180.0
+def _distance_deg(state: ControlState, status: Status, target: Pointing) -> float:
+    """Angle on the sky between antenna and path, less what the path moved since the reading."""
     lag_deg = 0.15 * hypot(target.az_rate_deg_s, target.el_rate_deg_s)
-    return sky_angle_deg(state.az_deg, state.status.el_deg, target.az_deg, target.el_deg) - lag_deg
+    return sky_angle_deg(state.az_deg, status.el_deg, target.az_deg, target.el_deg) - lag_deg
 
 
 def _of_time(state: ControlState, sky: Sky, now_tai_s: float, config: ControlConfig) -> set[Cause]:

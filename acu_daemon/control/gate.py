@@ -19,7 +19,7 @@ CHASE_RATE_MARGIN = 0.9  # while it chases the path: an antenna that fell behind
 CHASE_ACCELERATION_MARGIN = 0.6  # and must not stay behind its registers all the way (decision 0020)
 ENTRY_S = 1.2  # where the satellite enters the beam, autotrack takes over: half a beam in no less time than this
 STRAY_DEG = 0.5  # an antenna this far from the register it is about to follow starts from where it is
-WINDUP_DEG = 10.0  # a followed register may lead the antenna by this and WINDUP_S of the motion, else starts anew
+WINDUP_DEG = 10.0  # a followed register may lead the antenna by this and WINDUP_S of the motion, then it waits
 WINDUP_S = 0.2
 LEAST_COS_EL = 0.01
 FRESH_S = 1.0  # readings older than this say nothing about the present rate
@@ -50,8 +50,9 @@ def gate(
     if is_followed:
         half_beam_deg = config.beamwidth_deg / 2
         half_beam_az_deg = half_beam_deg / max(cos(radians(wanted.el_deg)), LEAST_COS_EL)
-        new_az = _reachable(az, new_az, dt_s, config.azimuth, half_beam_az_deg)
-        new_el = _reachable(el, new_el, dt_s, config.elevation, half_beam_deg)
+        antenna_az, antenna_el = _antenna(state, now_tai_s)
+        new_az = _reachable(az, _waiting(az, antenna_az, new_az), dt_s, config.azimuth, half_beam_az_deg)
+        new_el = _reachable(el, _waiting(el, antenna_el, new_el), dt_s, config.elevation, half_beam_deg)
     is_held_back = new_az.position_deg != wanted.az_deg or new_el.position_deg != wanted.el_deg
     return Passed(_legal(new_az, config.azimuth), _legal(new_el, config.elevation), is_held_back)
 
@@ -65,7 +66,7 @@ def _refusal(wanted: Pointing, config: ControlConfig) -> str:
         ("elevation", wanted.el_deg, config.elevation),
     ):
         if not limits.min_deg - LIMIT_SLACK_DEG <= angle_deg <= limits.max_deg + LIMIT_SLACK_DEG:
-            return f"{name} {angle_deg:.2f} deg is outside [{limits.min_deg:g}, {limits.max_deg:g}]"
+            return f"{name} outside {limits.min_deg:g} to {limits.max_deg:g} deg"
     return ""
 
 
@@ -73,8 +74,8 @@ def _from(state: ControlState, now_tai_s: float, *, is_followed: bool) -> tuple[
     """Where a followed register starts from: the last command, or the antenna when it is not there."""
     az, el = _antenna(state, now_tai_s)
     return (
-        _anchor(state.axis_az, az, begins=is_followed and not state.was_followed, is_followed=is_followed),
-        _anchor(state.axis_el, el, begins=is_followed and not state.was_followed, is_followed=is_followed),
+        _anchor(state.axis_az, az, begins=is_followed and not state.was_followed),
+        _anchor(state.axis_el, el, begins=is_followed and not state.was_followed),
     )
 
 
@@ -90,14 +91,24 @@ def _antenna(state: ControlState, now_tai_s: float) -> tuple[AxisState, AxisStat
     return AxisState(last[1] + az_rate * age_s, az_rate), AxisState(last[2] + el_rate * age_s, el_rate)
 
 
-def _anchor(last: AxisState | None, antenna: AxisState, *, begins: bool, is_followed: bool) -> AxisState:
+def _anchor(last: AxisState | None, antenna: AxisState, *, begins: bool) -> AxisState:
     if last is None:
         return replace(antenna, rate_deg_s=0.0)
-    away_deg = abs(last.position_deg - antenna.position_deg)
-    moving_deg = WINDUP_S * max(abs(last.rate_deg_s), abs(antenna.rate_deg_s))
-    if (begins and away_deg > STRAY_DEG + moving_deg) or (is_followed and away_deg > WINDUP_DEG + moving_deg):
-        return antenna
-    return last
+    is_stray = abs(last.position_deg - antenna.position_deg) > STRAY_DEG + _moving_deg(last, antenna)
+    return antenna if begins and is_stray else last
+
+
+def _moving_deg(register: AxisState, antenna: AxisState) -> float:
+    return WINDUP_S * max(abs(register.rate_deg_s), abs(antenna.rate_deg_s))
+
+
+def _waiting(register: AxisState, antenna: AxisState, wanted: AxisState) -> AxisState:
+    """Let a register stand that leads its antenna by too much, until the antenna has come; it is never put back."""
+    lead_deg = register.position_deg - antenna.position_deg
+    is_leaving = (wanted.position_deg - register.position_deg) * lead_deg > 0.0
+    if is_leaving and abs(lead_deg) > WINDUP_DEG + _moving_deg(register, antenna):
+        return AxisState(register.position_deg)
+    return wanted
 
 
 def _reachable(start: AxisState, wanted: AxisState, dt_s: float, limits: AxisLimits, half_beam_deg: float) -> AxisState:

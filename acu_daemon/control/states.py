@@ -40,6 +40,9 @@ class Cause(StrEnum):
     PASS_NEAR = "the pass is near"
     PASS_OVER = "the pass is over"
     ON_POINT = "the antenna stands on the predicted path"
+    ON_POINT_FITTED = "the antenna stands on the path of this pass's fit"
+    STILL_SELECTED = "autotrack is still selected, near the predicted path"
+    STILL_FITTED = "interrupted in mid-pass, and a fit of this pass exists"
     ACQUIRED = "the signal is acquired"
     ACQUIRED_FITTED = "the signal is acquired and a fit of this pass exists"
     FIT = "a fit was accepted"
@@ -83,7 +86,10 @@ TABLE: tuple[Row, ...] = (
     Row(ACTIVE, Cause.PASS_OVER, S.IDLE, "set of the pass"),
     Row(frozenset({S.IDLE, S.PREPOSITION}), Cause.ACQUIRED_FITTED, S.AUTOTRACK_FITTED),
     Row(frozenset({S.IDLE, S.PREPOSITION}), Cause.ACQUIRED, S.AUTOTRACK_TLE),
+    Row(frozenset({S.IDLE}), Cause.STILL_FITTED, S.HOLD_FITTED),
+    Row(frozenset({S.IDLE}), Cause.STILL_SELECTED, S.ACQUIRE_TLE),
     Row(frozenset({S.IDLE}), Cause.PASS_NEAR, S.PREPOSITION, "preposition_s before the rise"),
+    Row(frozenset({S.PREPOSITION}), Cause.ON_POINT_FITTED, S.HOLD_FITTED),
     Row(frozenset({S.PREPOSITION}), Cause.ON_POINT, S.ACQUIRE_TLE, "20 s before the rise or later"),
     Row(TRACKING, Cause.MODE_LEFT, S.IDLE),
     Row(frozenset({S.ACQUIRE_TLE, S.SEARCH}), Cause.ACQUIRED_FITTED, S.AUTOTRACK_FITTED),

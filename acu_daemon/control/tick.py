@@ -23,9 +23,9 @@ from acu_daemon.control.state import (
 )
 from acu_daemon.control.states import ACTIVE, AUTOTRACKING, HOLDING, TrackState, transition
 from acu_daemon.model import Pointing, Reading
-from acu_daemon.pointing.wrap import encoder_continuous
+from acu_daemon.pointing.wrap import encoder_continuous, nearest_turn
 from acu_daemon.protocol.angles import LSB_DEG
-from acu_daemon.protocol.messages import AcuMode, Command, Nak, Poll, Status, WriteAndPoll
+from acu_daemon.protocol.messages import AcuMode, Backup, Command, Nak, Poll, Status, WriteAndPoll
 from acu_daemon.units import wrap_180
 
 OFFSET_GAIN = 0.6  # of the newest reading in the smoothed distance to the prediction: autotrack pulls in quickly
@@ -97,6 +97,7 @@ def _absorb_reading(state: ControlState, status: Status, reading: Reading, confi
     state = _learn_lag(state, az_deg, status.el_deg)
     return replace(
         state,
+        stage=_stage_after(state, status),
         status=status,
         reading=reading,
         az_deg=az_deg,
@@ -105,6 +106,14 @@ def _absorb_reading(state: ControlState, status: Status, reading: Reading, confi
         has_acquired=state.has_acquired or since is not None,
         is_stow_kept=_is_stow_kept(state, status),
     )
+
+
+def _stage_after(state: ControlState, status: Status) -> Stage:
+    """A backup that changed by itself shows a power cycle: the registers, the tilt among them, are read again."""
+    was_remote = state.status is not None and state.status.backup_selected is Backup.REMOTE
+    if state.stage is Stage.READY and was_remote and status.backup_selected is not Backup.REMOTE:
+        return Stage.IDENTIFIED
+    return state.stage
 
 
 def _is_stow_kept(state: ControlState, status: Status) -> bool:
@@ -224,7 +233,8 @@ def _write(
     passed = gate(wanted, state, now_tai_s, is_followed=is_followed, dt_s=dt_s, config=config)
     if passed.refusal != state.refusal:
         if passed.refusal:
-            events.append(Event("gate.refused", {"reason": passed.refusal, "state": str(state.track)}, is_warning=True))
+            fields = {"reason": passed.refusal, "az_deg": wanted.az_deg, "el_deg": wanted.el_deg}
+            events.append(Event("gate.refused", fields, is_warning=True))
         state = replace(state, refusal=passed.refusal)
     return _sent(state, passed, now_tai_s, config, is_followed=is_followed)
 
@@ -260,10 +270,8 @@ def _wanted(state: ControlState, sky: Sky, now_tai_s: float, config: ControlConf
     el = _point(state, sky, aim_tai_s + lag_el_s, config, is_followed=is_followed)
     if az is None or el is None:
         return _rest(state, is_followed=is_followed)
-    az_deg = az.az_deg
-    if is_followed and state.track is not TrackState.PREPOSITION:
-        az_deg = _on_turn(az_deg, state, config)
-    return _within(Pointing(az_deg, el.el_deg, az.az_rate_deg_s, el.el_rate_deg_s), config, is_followed=is_followed)
+    az_deg = _on_turn(az.az_deg, state, config, is_followed=is_followed)
+    return Pointing(az_deg, el.el_deg, az.az_rate_deg_s, el.el_rate_deg_s)
 
 
 def _point(
@@ -290,19 +298,13 @@ def _rest(state: ControlState, *, is_followed: bool) -> Pointing:
     return Pointing(state.az_deg, el_deg, 0.0, 0.0)
 
 
-def _on_turn(az_deg: float, state: ControlState, config: ControlConfig) -> float:
-    """Take the same bearing on the antenna's own turn of the wrap, where the limits allow it."""
-    near_deg = state.axis_az.position_deg if state.axis_az is not None and state.was_followed else state.az_deg
-    nearest_deg = near_deg + wrap_180(az_deg - near_deg)
-    if config.azimuth.min_deg <= nearest_deg <= config.azimuth.max_deg:
-        return nearest_deg
-    return az_deg
+def _on_turn(az_deg: float, state: ControlState, config: ControlConfig, *, is_followed: bool) -> float:
+    """Take a bearing on a turn inside the limits: a follower's own, or past its end the long way round on another.
 
-
-def _within(point: Pointing, config: ControlConfig, *, is_followed: bool) -> Pointing:
-    """Registers that are not followed may hold any turn: take one inside the limits."""
-    az_deg = point.az_deg
-    if not is_followed and not config.azimuth.min_deg <= az_deg <= config.azimuth.max_deg:
-        middle_deg = (config.azimuth.min_deg + config.azimuth.max_deg) / 2
-        az_deg = middle_deg + wrap_180(az_deg - middle_deg)
-    return replace(point, az_deg=az_deg)
+    PREPOSITION goes to the turn that was planned, and registers that are not followed may hold any.
+    """
+    near_deg = az_deg
+    if is_followed and state.track is not TrackState.PREPOSITION:
+        near_deg = state.axis_az.position_deg if state.axis_az is not None and state.was_followed else state.az_deg
+    turned_deg = nearest_turn(az_deg, near_deg, config.azimuth)
+    return az_deg if turned_deg is None else turned_deg

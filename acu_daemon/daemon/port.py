@@ -17,7 +17,7 @@ from acu_daemon.protocol.sa3842 import cycle_s, exchange_bytes
 EXCHANGE_DEADLINE_S = 0.090  # a reply is complete within this of the start of the write, ICD section 1
 CYCLE_SHARE = 0.95  # an exchange goes beside the write only if both fit into this share of the period, ICD section 6
 FIRST_BACK_OFF_S = 0.1
-LAST_BACK_OFF_S = 5.0
+LAST_BACK_OFF_S = 1.0  # a pass is short: more than a second of waiting costs more than an attempt
 LONGEST_EXTRA = 18  # bytes of the longest housekeeping exchange that goes beside a write, ICD section 6
 
 
@@ -42,11 +42,18 @@ class AcuPort:
         self._latencies_s: deque[float] = deque([device_delay_s], maxlen=100)
         self._log: Any = structlog.get_logger("link")
         self._reopen = asyncio.Event()
-        self.is_up = False
+        self._up = asyncio.Event()
         self.problem = ""
         self.last_reply_s = clock.monotonic_s()
         self.connect_count = 0
         self.failed_exchange_count = 0
+
+    @property
+    def is_up(self) -> bool:
+        return self._up.is_set()
+
+    async def wait_until_up(self) -> None:
+        await self._up.wait()
 
     @property
     def must_poll(self) -> bool:
@@ -88,6 +95,7 @@ class AcuPort:
         except TimeoutError:
             pass
         except LinkError as error:
+            self.problem = str(error)
             self._drop(str(error))
         if reply is None:
             self._exchange.fail()
@@ -111,7 +119,7 @@ class AcuPort:
 
     def _drop(self, problem: str) -> None:
         if self.is_up:
-            self.is_up = False
+            self._up.clear()
             self.problem = problem
             self._reopen.set()
 
@@ -137,22 +145,24 @@ class AcuPort:
                 self.connect_count += 1
                 self._log.info("link.open", link=self._link.description)
                 self._reopen.clear()
-                self.is_up = True
+                self._up.set()
                 await self._reopen.wait()
                 self._log.warning("link.lost", link=self._link.description, reason=self.problem)
                 await self._link.close()
         finally:
-            self.is_up = False
+            self._up.clear()
             await self._link.close()
 
     async def _first_poll(self) -> None:
         """A link counts as up when the ACU has answered on it once."""
-        self._exchange = HostExchange(self._address)
+        self._exchange, self.problem = HostExchange(self._address), ""
         for _ in range(3):
             answer = await self.exchange(Poll())
             if answer.reply is not None:
                 return
-        raise LinkError(self.problem or f"{self._link.description} is open, but no ACU answers a poll")
+            if self.problem:
+                raise LinkError(self.problem)
+        raise LinkError(f"{self._link.description} is open, but no ACU answers a poll")
 
     def abandon(self) -> None:
         """Give up an exchange whose waiter was cancelled, so that the next one starts clean."""
