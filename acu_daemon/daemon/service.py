@@ -177,10 +177,11 @@ class Service:
 
     async def _safe_stop(self) -> bool:
         self._port.abandon()
-        if not self._port.is_up:
-            return self._foreground.write_count == 0
+        if self._foreground.write_count == 0:
+            return True
         try:
             async with asyncio.timeout(STOP_DEADLINE_S):
+                await self._port.wait_until_up()
                 return await self._foreground.safe_stop()
         except TimeoutError:
             self._log.error("stop.timeout", advice="the antenna may still follow its registers: look at the ACU")
