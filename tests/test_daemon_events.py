@@ -9,6 +9,7 @@ from flights import (
     DEMO_TAI_S,
     ORDERS,
     RISING_TAI_S,
+    Script,
     climb,
     commands_between,
     count,
@@ -186,6 +187,22 @@ def test_a_link_that_is_hung_up_comes_back_at_once_and_autotrack_is_left_alone()
 def test_a_long_silence_ends_within_two_seconds_of_its_cause() -> None:
     flight = climb(60.0, script=[(12.0, cut(True)), (45.0, cut(False))])
     assert seconds_to_state(flight, "AUTOTRACK/FITTED", T + 45.0) < 3.0
+
+
+@pytest.mark.parametrize(
+    "blow",
+    [
+        [(15.0, cut(True)), (16.0, cut(False))],
+        [(15.05, acu_does(lambda acu, now: acu.power_cycle(now)))],
+    ],
+    ids=["link", "power"],
+)
+def test_a_blow_in_a_long_loss_brings_back_the_hold_on_the_fit_and_no_early_search(blow: Script) -> None:
+    target = demo_target(fallback={"acquire_s": 5.0})
+    flight = climb(45.0, target, losses=[(12.0, 42.0)], script=blow)
+    assert "SEARCH" not in flight.states()
+    assert state_at(flight, T + 41.0) == "HOLD/FITTED"
+    assert worst_error_deg(flight, T + 22.0, T + 42.0) < HOLD_DEG
 
 
 def test_one_lost_reply_costs_one_write_and_no_state() -> None:
@@ -394,6 +411,22 @@ def test_a_stop_while_the_local_panel_has_control_sends_nothing() -> None:
     )
     assert count(flight, Stop) == 0
     assert events_named(flight, "stop.left_alone")
+
+
+def test_a_stop_while_the_link_is_lost_waits_a_moment_for_it() -> None:
+    script = [(15.0, cut(True)), (16.0, lambda stage: stage.service.stop("SIGTERM")), (16.3, cut(False))]
+    flight = climb(30.0, script=script)
+    assert flight.outcome is not None
+    assert flight.outcome.is_stopped
+    assert isinstance(flight.commands[-1][1], Stop)
+
+
+def test_a_stop_on_a_dead_link_is_reported_and_does_not_hang() -> None:
+    flight = climb(30.0, script=[(15.0, cut(True)), (16.0, lambda stage: stage.service.stop("SIGTERM"))])
+    assert flight.outcome is not None
+    assert not flight.outcome.is_stopped
+    assert events_named(flight, "stop.timeout")
+    assert flight.snapshots[-1].tai_s < T + 16.2
 
 
 def test_a_stop_while_the_acu_stows_sends_nothing() -> None:
