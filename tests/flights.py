@@ -171,12 +171,6 @@ def fastest_followed_deg_s(flight: Flight) -> tuple[float, float]:
     return fastest_az, fastest_el
 
 
-def unwound_deg(flight: Flight, from_tai_s: float, to_tai_s: float) -> float:
-    """Largest swing of the azimuth axis within any 10 s."""
-    az = np.array([row.encoder_az_deg for row in rows_between(flight, from_tai_s, to_tai_s)])
-    return float(np.max(np.abs(az[100:] - az[:-100]))) if az.size > 100 else 0.0
-
-
 def shifted(moment_tai_s: float) -> Target:
     """SCD-1's orbit with another epoch, so that it stands high over the station at an instant."""
     known = scd_target(SCD_HIGH_TAI_S)

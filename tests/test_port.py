@@ -1,0 +1,201 @@
+"""One exchange after another: deadlines, late replies, the link kept alive."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+
+import pytest
+from fake_sky import AZIMUTH, ELEVATION, START_TAI_S, Star
+
+from acu_daemon.daemon.port import EXCHANGE_DEADLINE_S, AcuPort
+from acu_daemon.edge.clock import LoopClock
+from acu_daemon.errors import LinkError
+from acu_daemon.protocol.messages import Ack, AcuMode, Nak, Poll, SelectMode, Status, Stow, WriteAndPoll
+from acu_daemon.protocol.sa3842 import DEFAULT_ADDRESS
+from acu_daemon.sim.acu import FakeAcu
+from acu_daemon.sim.memory import MemoryLink
+from acu_daemon.sim.parts import AcuParts
+from acu_daemon.sim.scenario import AcuChoice, Scenario
+from acu_daemon.sim.virtual import run_virtual
+
+BAUD_9600_S = 10 / 9600
+WIRE_S = 45 * BAUD_9600_S  # a WRITE AND STATUS there and back
+
+Story = Callable[[AcuPort, MemoryLink, LoopClock], Awaitable[None]]
+
+
+def play(story: Story, *, latency_s: float = 0.010, byte_time_s: float = 0.0, is_kept: bool = True) -> None:
+    """Tell a story of a port and a link in virtual time."""
+
+    async def main() -> None:
+        clock = LoopClock(START_TAI_S)
+        scenario = Scenario(acu=AcuChoice(reply_latency_s=latency_s))
+        acu = FakeAcu(AcuParts(AZIMUTH, ELEVATION, 1.0, Star(), START_TAI_S, scenario))
+        link = MemoryLink(acu, clock, byte_time_s)
+        port = AcuPort(link, clock, DEFAULT_ADDRESS, 0.1, 0.010)
+        async with asyncio.TaskGroup() as group:
+            if is_kept:
+                keeper = group.create_task(port.keep())
+                await asyncio.sleep(0.2)
+                await story(port, link, clock)
+                keeper.cancel()
+            else:
+                await link.open()
+                await story(port, link, clock)
+
+    run_virtual(main())
+
+
+def test_an_exchange_brings_the_reply_and_the_times_of_its_write_and_its_first_byte() -> None:
+    async def story(port: AcuPort, _link: MemoryLink, clock: LoopClock) -> None:
+        began = clock.tai_s()
+        answer = await port.exchange(Poll())
+        assert isinstance(answer.reply, Status)
+        assert answer.started_tai_s == began
+        assert answer.first_byte_tai_s == pytest.approx(began + 0.010, abs=1e-6)
+
+    play(story)
+
+
+def test_a_reply_that_does_not_come_fails_at_the_deadline_and_the_next_command_must_be_a_poll() -> None:
+    async def story(port: AcuPort, link: MemoryLink, clock: LoopClock) -> None:
+        link.is_cut = True
+        began = clock.monotonic_s()
+        answer = await port.exchange(WriteAndPoll(0.0, 45.0))
+        assert answer.reply is None
+        assert clock.monotonic_s() - began == pytest.approx(EXCHANGE_DEADLINE_S, abs=1e-6)
+        assert port.must_poll
+        link.is_cut = False
+        with pytest.raises(RuntimeError, match="Poll"):
+            await port.exchange(SelectMode(AcuMode.REMOTE))
+        assert isinstance((await port.exchange(Poll())).reply, Status)
+        assert not port.must_poll
+        assert port.failed_exchange_count == 1
+
+    play(story)
+
+
+def test_a_late_reply_is_not_taken_for_the_next_one() -> None:
+    async def story(port: AcuPort, _link: MemoryLink, _clock: LoopClock) -> None:
+        assert (await port.exchange(WriteAndPoll(10.0, 45.0))).reply is None  # its reply comes after 120 ms
+        await asyncio.sleep(0.025)
+        assert (await port.exchange(Poll())).reply is None
+        assert port.discarded_count >= 1
+
+    play(story, latency_s=0.120, is_kept=False)
+
+
+def test_a_refusal_is_an_answer() -> None:
+    async def story(port: AcuPort, _link: MemoryLink, _clock: LoopClock) -> None:
+        assert (await port.exchange(Stow())).reply == Ack()
+        assert (await port.exchange(SelectMode(AcuMode.AUTOTRACK))).reply == Nak()
+
+    play(story)
+
+
+def test_a_silent_link_is_dropped_and_opened_again() -> None:
+    async def story(port: AcuPort, link: MemoryLink, _clock: LoopClock) -> None:
+        link.is_cut = True
+        await port.exchange(Poll())
+        port.drop_if_silent(0.5)
+        assert port.is_up
+        await asyncio.sleep(0.6)
+        port.drop_if_silent(0.5)
+        assert not port.is_up
+        link.is_cut = False
+        await asyncio.sleep(1.5)
+        assert port.is_up
+        assert port.connect_count == 2
+
+    play(story)
+
+
+def test_an_acu_that_another_client_holds_is_asked_again_each_second_and_the_reason_is_kept() -> None:
+    async def story(port: AcuPort, link: MemoryLink, _clock: LoopClock) -> None:
+        link.is_refused = True
+        link.hang_up()
+        await port.exchange(Poll())
+        await asyncio.sleep(8.0)
+        assert not port.is_up
+        assert "another client" in port.problem
+        link.is_refused = False
+        await asyncio.sleep(1.1)
+        assert port.is_up
+
+    play(story)
+
+
+def test_a_link_counts_as_up_only_when_the_acu_answered_on_it() -> None:
+    async def main() -> None:
+        clock = LoopClock(START_TAI_S)
+        acu = FakeAcu(AcuParts(AZIMUTH, ELEVATION, 1.0, Star(), START_TAI_S, Scenario()))
+        link = MemoryLink(acu, clock)
+        link.is_cut = True
+        port = AcuPort(link, clock, DEFAULT_ADDRESS, 0.1, 0.010)
+        async with asyncio.TaskGroup() as group:
+            keeper = group.create_task(port.keep())
+            await asyncio.sleep(3.0)
+            assert not port.is_up
+            assert "no ACU answers" in port.problem
+            keeper.cancel()
+
+    run_virtual(main())
+
+
+class Dead(MemoryLink):
+    """Cannot even be written to."""
+
+    def write(self, data: bytes) -> None:
+        raise LinkError("the adapter was pulled out")
+
+
+def test_a_link_that_breaks_in_mid_write_is_no_exception_but_a_failed_exchange() -> None:
+    async def main() -> None:
+        clock = LoopClock(START_TAI_S)
+        link = Dead(FakeAcu(AcuParts(AZIMUTH, ELEVATION, 1.0, Star(), START_TAI_S, Scenario())), clock)
+        port = AcuPort(link, clock, DEFAULT_ADDRESS, 0.1, 0.010)
+        await link.open()
+        assert (await port.exchange(Poll())).reply is None
+        assert port.problem == "the adapter was pulled out"
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize(("latency_s", "has_room"), [(0.002, True), (0.010, True), (0.020, False)])
+def test_at_9600_baud_there_is_room_for_a_second_exchange_only_while_the_acu_is_quick(
+    latency_s: float, has_room: bool
+) -> None:
+    """ICD section 6: both exchanges take 71.7, 87.7 and 107.7 ms at 2, 10 and 20 ms latency."""
+
+    async def story(port: AcuPort, _link: MemoryLink, clock: LoopClock) -> None:
+        began = clock.monotonic_s()
+        assert (await port.exchange(WriteAndPoll(10.0, 45.0))).reply is not None
+        assert clock.monotonic_s() - began == pytest.approx(WIRE_S + latency_s, abs=1e-3)
+        assert port.has_room is has_room
+
+    play(story, latency_s=latency_s, byte_time_s=BAUD_9600_S)
+
+
+def test_the_idle_gap_is_ten_bits_of_the_wire_and_nothing_on_tcp() -> None:
+    async def slow(port: AcuPort, _link: MemoryLink, clock: LoopClock) -> None:
+        began = clock.monotonic_s()
+        await port.idle_gap()
+        assert clock.monotonic_s() - began == pytest.approx(BAUD_9600_S)
+
+    async def quick(port: AcuPort, _link: MemoryLink, clock: LoopClock) -> None:
+        began = clock.monotonic_s()
+        await port.idle_gap()
+        assert clock.monotonic_s() == began
+
+    play(slow, byte_time_s=BAUD_9600_S)
+    play(quick)
+
+
+def test_waiting_for_a_link_ends_when_it_is_up() -> None:
+    async def story(port: AcuPort, link: MemoryLink, _clock: LoopClock) -> None:
+        link.hang_up()
+        await port.exchange(Poll())
+        assert not port.is_up
+        async with asyncio.timeout(1.0):
+            await port.wait_until_up()
+
+    play(story)

@@ -1,0 +1,285 @@
+"""control.tick as what it is: a pure function from what the ACU said to what it is told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acu_daemon.control.causes import LINK_SILENCE_S
+from acu_daemon.control.state import (
+    ControlConfig,
+    ControlState,
+    Exchange,
+    Observation,
+    Orders,
+    PassPlan,
+    Sky,
+    Stage,
+)
+from acu_daemon.control.states import ACTIVE, TrackState
+from acu_daemon.control.tick import EXTRA_REPEAT_S, REFUSED_EXTRA_S, REFUSED_PAUSE_S, tick
+from acu_daemon.model import AxisLimits, Prediction, Reading
+from acu_daemon.protocol.angles import LSB_DEG
+from acu_daemon.protocol.messages import (
+    AcuMode,
+    Backup,
+    Command,
+    Identify,
+    Nak,
+    Poll,
+    ReadFaults,
+    ReadRegisters,
+    Registers,
+    SelectBackup,
+    SelectMode,
+    Status,
+    WriteAndPoll,
+    WriteRegisters,
+)
+
+CONFIG = ControlConfig(AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0))
+NOW = 8.4e8
+AZ_DEG, EL_DEG, AZ_RATE, EL_RATE = 100.0, 40.0, 0.5, 0.3
+LEAD_S = CONFIG.effect_delay_s + CONFIG.period_s / 2
+
+
+def path(kind: str = "TLE") -> Prediction:
+    """A straight path through AZ_DEG, EL_DEG at NOW."""
+    t = np.arange(-10, 900) * 0.1
+    az, el = AZ_DEG + AZ_RATE * t, EL_DEG + EL_RATE * t
+    az_rate, el_rate = np.full(t.size, AZ_RATE), np.full(t.size, EL_RATE)
+    return Prediction(NOW - 1.0, 0.1, az, el, az_rate, el_rate, az, az_rate, kind, NOW)  # type: ignore[arg-type]
+
+
+PLAN = PassPlan(NOW - 100.0, NOW + 500.0, NOW - 100.0, 50.0, 5.0)
+SKY = Sky(path(), None, PLAN)
+FITTED = Sky(path("FITTED"), None, PLAN)
+
+
+def status(mode: AcuMode = AcuMode.AUTOTRACK, **changes: object) -> Status:
+    values: dict[str, object] = {
+        "backup_selected": Backup.REMOTE,
+        "is_autotrack_selected": mode in (AcuMode.ACQUIRE, AcuMode.AUTOTRACK, AcuMode.REMOTE_BACKUP),
+        "is_acquired": mode is AcuMode.AUTOTRACK,
+        "is_sector_high": True,
+    }
+    return Status(AZ_DEG, EL_DEG, mode, **values | changes)  # type: ignore[arg-type]
+
+
+def ready(track: TrackState, seen: Status) -> ControlState:
+    """A daemon that started long ago."""
+    return ControlState(track=track, entered_tai_s=NOW - 50.0, stage=Stage.READY, status=seen, az_deg=AZ_DEG)
+
+
+def saw(seen: Status, **changes: object) -> Observation:
+    reading = Reading(NOW - 0.09, seen.az_deg, seen.el_deg, seen.is_acquired)
+    return Observation(reading=reading, status=seen, **changes)  # type: ignore[arg-type]
+
+
+def step(
+    track: TrackState, seen: Status, sky: Sky = SKY, config: ControlConfig = CONFIG, **changes: object
+) -> tuple[ControlState, Orders]:
+    return tick(ready(track, seen), saw(seen, **changes), sky, NOW, config)
+
+
+# What is sent
+
+
+def test_in_autotrack_the_registers_hold_the_path_at_the_middle_of_their_time_in_force() -> None:
+    _, orders = step(TrackState.AUTOTRACK_FITTED, status(), FITTED)
+    assert isinstance(orders.first, WriteAndPoll)
+    assert orders.first.az_deg == pytest.approx(AZ_DEG + AZ_RATE * LEAD_S, abs=LSB_DEG)
+    assert orders.first.el_deg == pytest.approx(EL_DEG + EL_RATE * LEAD_S, abs=LSB_DEG)
+
+
+def test_before_a_fit_the_registers_hold_the_reading_plus_the_motion_over_the_lead() -> None:
+    seen = replace(status(), az_deg=AZ_DEG + 0.4, el_deg=EL_DEG - 0.2)
+    _, orders = step(TrackState.AUTOTRACK_TLE, seen)
+    assert isinstance(orders.first, WriteAndPoll)
+    lead_s = LEAD_S + 0.09  # the reading is that much older than now
+    assert orders.first.az_deg == pytest.approx(AZ_DEG + 0.4 + AZ_RATE * lead_s, abs=LSB_DEG)
+    assert orders.first.el_deg == pytest.approx(EL_DEG - 0.2 + EL_RATE * lead_s, abs=LSB_DEG)
+
+
+def test_a_late_tick_aims_for_the_moment_it_really_writes() -> None:
+    seen = status()
+    _, orders = tick(ready(TrackState.AUTOTRACK_FITTED, seen), saw(seen), FITTED, NOW + 0.35, CONFIG)
+    assert isinstance(orders.first, WriteAndPoll)
+    assert orders.first.az_deg == pytest.approx(AZ_DEG + AZ_RATE * (0.35 + LEAD_S), abs=LSB_DEG)
+
+
+def test_the_tilt_register_goes_back_as_it_was_read() -> None:
+    seen = status()
+    _, orders = tick(replace(ready(TrackState.IDLE, seen), tilt_code=4321), saw(seen), Sky(), NOW, CONFIG)
+    assert isinstance(orders.first, WriteAndPoll)
+    assert orders.first.tilt_code == 4321
+
+
+def test_after_a_failed_exchange_nothing_but_a_poll_is_sent() -> None:
+    _, orders = step(TrackState.HOLD_FITTED, status(AcuMode.STANDBY), FITTED, must_poll=True)
+    assert (orders.first, orders.extra) == (Poll(), None)
+
+
+def test_without_room_in_the_cycle_an_extra_takes_the_place_of_one_write() -> None:
+    seen = status(backup_selected=Backup.RATE)
+    _, orders = step(TrackState.AUTOTRACK_FITTED, seen, FITTED, has_room=False)
+    assert (orders.first, orders.extra) == (SelectBackup(Backup.REMOTE), None)
+
+
+def test_with_room_an_extra_goes_beside_the_write() -> None:
+    _, orders = step(TrackState.AUTOTRACK_FITTED, status(backup_selected=Backup.RATE), FITTED)
+    assert isinstance(orders.first, WriteAndPoll)
+    assert orders.extra == SelectBackup(Backup.REMOTE)
+
+
+@pytest.mark.parametrize("track", list(TrackState))
+def test_under_the_local_panel_it_polls_and_nothing_else(track: TrackState) -> None:
+    _, orders = step(track, status(AcuMode.MANUAL, is_remote_enabled=False))
+    assert (orders.first, orders.extra) == (Poll(), None)
+
+
+@pytest.mark.parametrize("track", list(TrackState))
+@pytest.mark.parametrize("mode", list(AcuMode))
+def test_disarmed_it_only_reads(track: TrackState, mode: AcuMode) -> None:
+    state = replace(ready(track, status(mode)), stage=Stage.REGISTERS_KNOWN)
+    _, orders = tick(state, saw(status(mode)), SKY, NOW, replace(CONFIG, is_armed=False))
+    assert orders.first == Poll()
+    assert orders.extra is None or isinstance(orders.extra, ReadFaults)
+
+
+@pytest.mark.parametrize("stage", [stage for stage in Stage if stage is not Stage.READY])
+def test_before_the_start_is_done_no_path_is_written_and_no_mode_selected(stage: Stage) -> None:
+    state = replace(ready(TrackState.IDLE, status(AcuMode.STANDBY)), stage=stage)
+    _, orders = tick(state, saw(status(AcuMode.STANDBY)), FITTED, NOW, CONFIG)
+    assert orders.first == Poll()
+    assert not isinstance(orders.extra, SelectMode | SelectBackup)
+
+
+# The states
+
+
+def test_the_backup_is_selected_before_the_mode_and_the_mode_only_once_the_backup_shows() -> None:
+    for backup, wanted in ((Backup.RATE, SelectBackup(Backup.REMOTE)), (Backup.REMOTE, SelectMode(AcuMode.AUTOTRACK))):
+        seen = status(AcuMode.STANDBY, backup_selected=backup)
+        state = replace(ready(TrackState.ACQUIRE_TLE, seen), entered_tai_s=NOW - 1.0)
+        _, orders = tick(state, saw(seen), SKY, NOW, CONFIG)
+        assert orders.extra == wanted
+
+
+def test_a_loss_with_a_fit_is_held_on_the_fit_and_without_one_on_the_elements() -> None:
+    lost = status(AcuMode.REMOTE_BACKUP, is_acquired=False)
+    assert step(TrackState.AUTOTRACK_FITTED, lost, FITTED)[0].track is TrackState.HOLD_FITTED
+    assert step(TrackState.AUTOTRACK_TLE, lost)[0].track is TrackState.HOLD_TLE
+
+
+def test_silence_of_the_link_makes_everything_start_anew() -> None:
+    seen = status()
+    state, orders = tick(
+        ready(TrackState.AUTOTRACK_FITTED, seen), Observation(silence_s=LINK_SILENCE_S + 0.01), FITTED, NOW, CONFIG
+    )
+    assert state.track is TrackState.LINK_LOST
+    assert state.stage is Stage.NEW
+    assert orders.first == Poll()
+    assert orders.extra in (None, Identify())
+
+
+def test_a_signal_long_before_the_rise_is_another_satellite() -> None:
+    sky = Sky(None, None, replace(PLAN, rise_tai_s=NOW + 600.0, start_tai_s=NOW + 600.0))
+    assert step(TrackState.IDLE, status(), sky)[0].track is TrackState.IDLE
+
+
+@pytest.mark.parametrize("track", sorted(ACTIVE))
+def test_a_fault_ends_every_active_state_and_asks_once_what_it_is(track: TrackState) -> None:
+    seen = status(AcuMode.FAULT, is_autotrack_selected=False)
+    state, orders = step(track, seen)
+    assert state.track is TrackState.FAULT
+    assert orders.extra == ReadFaults()
+    _, later = tick(state, saw(seen), SKY, NOW + 5.0, CONFIG)
+    assert later.extra is None
+
+
+@pytest.mark.parametrize("track", sorted(ACTIVE))
+def test_a_stow_from_elsewhere_ends_every_active_state_and_nothing_leaves_it(track: TrackState) -> None:
+    stowing = status(AcuMode.STOWING, is_autotrack_selected=False)
+    state, orders = step(track, stowing)
+    assert state.track is TrackState.STOW
+    assert orders.extra is None
+    stowed = replace(stowing, mode=AcuMode.STOWED)
+    for k in range(20):
+        state, orders = tick(state, saw(stowed), SKY, NOW + 1.0 + k, CONFIG)
+        assert orders.extra is None
+    assert state.track is TrackState.STOW
+
+
+# Refusals
+
+
+def test_one_refused_write_is_not_held_against_the_next_two_are() -> None:
+    seen = status()
+    state, orders = step(TrackState.AUTOTRACK_FITTED, seen, FITTED, refused=Nak())
+    assert isinstance(orders.first, WriteAndPoll)
+    state, orders = tick(state, saw(seen, refused=Nak()), FITTED, NOW + 0.1, CONFIG)
+    assert orders.first == Poll()
+    _, orders = tick(state, saw(seen), FITTED, NOW + 0.1 + REFUSED_PAUSE_S + 0.01, CONFIG)
+    assert isinstance(orders.first, WriteAndPoll)
+
+
+def extras_over(refusal: Nak | None, span_s: float) -> int:
+    """How often a backup that never shows is selected in a time."""
+    seen = status(backup_selected=Backup.RATE)
+    state, sent, last = ready(TrackState.AUTOTRACK_FITTED, seen), 0, None
+    for k in range(round(span_s * 10)):
+        extra = Exchange(last, refusal) if last is not None else None
+        state, orders = tick(state, saw(seen, extra=extra), FITTED, NOW + 0.1 * k, CONFIG)
+        last, sent = orders.extra, sent + (orders.extra is not None)
+    return sent
+
+
+def test_a_refused_extra_is_repeated_far_more_rarely_than_a_lost_one() -> None:
+    span_s = 6.0
+    assert extras_over(Nak(), span_s) <= span_s / REFUSED_EXTRA_S + 1
+    assert extras_over(None, span_s) >= span_s / EXTRA_REPEAT_S * 0.6
+
+
+# Always
+
+
+@given(
+    st.sampled_from(sorted(TrackState)),
+    st.sampled_from(sorted(AcuMode)),
+    st.floats(0, 360, exclude_max=True),
+    st.floats(0, 90),
+    st.booleans(),
+    st.booleans(),
+    st.sampled_from([SKY, FITTED, Sky(), Sky(None, None, PLAN)]),
+    st.booleans(),
+)
+def test_whatever_the_acu_says_no_write_is_outside_the_limits_and_the_input_is_untouched(
+    track, mode, az_deg, el_deg, is_remote, is_high, sky, has_room
+):
+    seen = replace(status(mode), az_deg=az_deg, el_deg=el_deg, is_remote_enabled=is_remote, is_sector_high=is_high)
+    before = ready(track, seen)
+    kept = replace(before)
+    state, orders = tick(before, saw(seen, has_room=has_room), sky, NOW, CONFIG)
+    assert before == kept
+    assert tick(before, saw(seen, has_room=has_room), sky, NOW, CONFIG) == (state, orders)
+    for command in (orders.first, orders.extra):
+        check_allowed(command, seen)
+
+
+def check_allowed(command: Command | None, seen: Status) -> None:
+    if isinstance(command, WriteAndPoll):
+        assert seen.is_remote_enabled
+        assert -270.0 <= command.az_deg <= 270.0
+        assert 0.0 <= command.el_deg <= 90.0
+
+
+def test_registers_read_back_wrong_are_written_again_before_any_mode() -> None:
+    seen = status(AcuMode.STANDBY)
+    state = replace(ready(TrackState.IDLE, seen), stage=Stage.PRESENT_WRITTEN, present_deg=(AZ_DEG, EL_DEG))
+    wrong = Exchange(ReadRegisters(), Registers(AZ_DEG + 5.0, EL_DEG, 0, 3))
+    state, orders = tick(state, saw(seen, extra=wrong), FITTED, NOW, CONFIG)
+    assert state.stage is Stage.SECTOR_FREE
+    assert isinstance(orders.extra, WriteRegisters)
