@@ -212,6 +212,14 @@ def test_one_lost_reply_costs_one_write_and_no_state() -> None:
     assert max(b - a for a, b in zip(times, times[1:], strict=False)) < 0.35
 
 
+def test_a_line_that_loses_one_reply_in_ten_never_loses_the_path() -> None:
+    blinks = [(5.0 + 0.97 * k + d, cut(is_cut)) for k in range(35) for d, is_cut in ((0.0, True), (0.05, False))]
+    flight = climb(42.0, losses=[(15.0, 38.0)], script=blinks)
+    assert worst_error_deg(flight, T + 15.0, T + 38.0) < HOLD_DEG
+    assert "LINK-LOST" not in flight.states()
+    assert flight.states()[-1] == "AUTOTRACK/FITTED"
+
+
 def test_no_acu_at_the_start_ends_the_run_after_ten_seconds() -> None:
     with pytest.raises(NoAcuError, match="10 s"):
         climb(30.0, script=[(0.0, cut(True))])

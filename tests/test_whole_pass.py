@@ -9,6 +9,7 @@ from flights import (
     climb,
     count,
     demo_target,
+    events_named,
     fastest_followed_deg_s,
     flight_of,
     loss,
@@ -201,6 +202,20 @@ def test_with_half_a_turn_either_way_it_waits_on_the_one_turn_that_holds_the_who
     assert worst_error_deg(flight, begin + 25.0, begin + 40.0) < 0.1
     assert -100.0 < flight.rows[-1].encoder_az_deg < -80.0
     assert all(-180.0 <= row.encoder_az_deg <= 180.0 for row in flight.rows)
+
+
+def test_a_pass_that_no_turn_holds_is_followed_to_the_stop_then_the_long_way_round_and_never_past_it() -> None:
+    begin = THROUGH_NORTH - 15.0
+    target = scd_target(begin, azimuth={"min_deg": 0.0, "max_deg": 360.0})
+    antenna = AcuChoice(azimuth_deg=340.0, elevation_deg=30.0)
+    flight = flight_of(target, begin, 55.0, antenna=antenna, errors=SkyErrors(along_track_s=0.2))
+    assert events_named(flight, "pass.wrap")
+    assert flight.outcome is not None
+    assert flight.outcome.refusal_count == 0
+    assert all(0.0 <= row.encoder_az_deg <= 360.0 for row in flight.rows)
+    assert flight.states()[-1] == "AUTOTRACK/FITTED"
+    assert worst_error_deg(flight, begin + 50.0, begin + 55.0) < HOLD_DEG
+    assert flight.rows[-1].encoder_az_deg < 20.0
 
 
 # The calendar
