@@ -18,7 +18,7 @@ _NEWEST_COUNT = 30  # readings that the residual is taken over
 class BaseEstimator(ABC):
     """Takes readings, oldest first, and corrects raan and mean anomaly of a source.  Mutable; one owner.
 
-    `rejected` has every reading left out, with its reason.
+    `rejected` has every reading left out, with its reason; `notes` what people should be told, until somebody takes it.
     """
 
     name: str
@@ -35,6 +35,7 @@ class BaseEstimator(ABC):
             settings.elevation,
         )
         self.rejected: list[Rejected] = []
+        self.notes: list[str] = []
         self.used_count = 0
         self._newest: list[tuple[float, float, float]] = []
 

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from acu_daemon.assist.averages import CircularEstimator, DeterministicEstimator
+from acu_daemon.assist.carry_over import CarryOver
 from acu_daemon.assist.full import FullEstimator
 from acu_daemon.assist.kalman import KalmanEstimator
 from acu_daemon.assist.settings import EstimatorSettings
@@ -11,7 +12,7 @@ from acu_daemon.errors import UsageError
 from acu_daemon.model import FitResult, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
 
-__all__ = ["ESTIMATORS", "Estimator", "EstimatorSettings", "make_estimator"]
+__all__ = ["ESTIMATORS", "Estimator", "EstimatorSettings", "has_covariance", "make_estimator"]
 
 
 class Estimator(Protocol):
@@ -20,6 +21,10 @@ class Estimator(Protocol):
     @property
     def name(self) -> str:
         """The method that runs."""
+
+    @property
+    def notes(self) -> list[str]:
+        """What people should be told; whoever tells them empties it."""
 
     def add(self, readings: Readings) -> None:
         """Take new readings only, oldest first, encoder angles."""
@@ -37,12 +42,22 @@ ESTIMATORS: dict[str, Callable[[Propagator, Site, EstimatorSettings], Estimator]
 }
 
 
-def make_estimator(name: str, propagator: Propagator, site: Site, settings: EstimatorSettings) -> Estimator:
+def has_covariance(name: str) -> bool:
+    """Whether an estimator knows a covariance: only then a pass's fit can be the next one's prior."""
+    return ESTIMATORS.get(name) is FullEstimator
+
+
+def make_estimator(
+    name: str, propagator: Propagator, site: Site, settings: EstimatorSettings, carried: CarryOver | None = None
+) -> Estimator:
     """Make an estimator that corrects a source.
 
     name: circular, deterministic, kalman or full; `full` runs `kalman`, and the caller says so (see `Estimator.name`).
+    carried: what an earlier pass left, an accepted one; without a meaning for estimators without covariance.
     Raises:  UsageError: no such estimator.
     """
     if name not in ESTIMATORS:
         raise UsageError(f"no estimator {name!r}: expected one of {', '.join(ESTIMATORS)}")
+    if has_covariance(name):
+        return FullEstimator(propagator, site, settings, carried)
     return ESTIMATORS[name](propagator, site, settings)

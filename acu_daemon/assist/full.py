@@ -3,9 +3,11 @@
 import numpy as np
 
 from acu_daemon.assist.base import BaseEstimator
+from acu_daemon.assist.carry_over import CarryOver, aged_prior
 from acu_daemon.assist.full_points import Sights, sights
 from acu_daemon.assist.full_solve import Problem, Solution, solve
-from acu_daemon.assist.full_states import bias_of, correction_of, make_prior, shift_of
+from acu_daemon.assist.full_states import Prior, bias_of, correction_of, make_prior, shift_of
+from acu_daemon.assist.innovation import DENIED_S, WIDEST_SIGMAS, Denial
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import Correction, FitResult, Readings, Site
 from acu_daemon.orbit.frames import station_itrs_m, teme_from_itrs
@@ -20,20 +22,44 @@ class FullEstimator(BaseEstimator):
 
     name = "full"
 
-    def __init__(self, propagator: Propagator, site: Site, settings: EstimatorSettings) -> None:
+    def __init__(
+        self, propagator: Propagator, site: Site, settings: EstimatorSettings, carried: CarryOver | None = None
+    ) -> None:
+        """Take what an earlier pass left; it is dropped, with a note, when a minute of readings denies it."""
         super().__init__(propagator, site, settings)
+        self._carried = carried
+        self._denial: Denial | None = None
         self._problem: Problem | None = None
         self._parts: list[Sights] = []
         self._solution: Solution | None = None
         self._is_new = False
 
     def _use(self, readings: Readings) -> list[str | None]:
+        seen = sights(readings)
         if self._problem is None:
-            prior = make_prior(self._source, self._settings, float(readings.tai_s[0]))
-            self._problem = Problem(self._source, self._site, self._settings, prior)
-        self._parts.append(sights(readings))
+            self._start(float(readings.tai_s[0]))
+        if self._denial is not None and self._denial.sees(seen):
+            self._carried = self._denial = None
+            self._start(float((self._parts or [seen])[0].tai_s[0]))
+            self.notes.append(
+                f"the last pass's orbit is dropped: for {DENIED_S:g} s all readings were more than {WIDEST_SIGMAS:g} "
+                "sigma from it, as after a manoeuvre"
+            )
+        self._parts.append(seen)
         self._is_new = True
         return [None] * len(readings)
+
+    def _start(self, first_tai_s: float) -> None:
+        """Begin with what is known before the first reading, the one at first_tai_s."""
+        self._solution = None
+        self._problem = Problem(self._source, self._site, self._settings, self._prior(first_tai_s))
+        if self._carried is not None:
+            self._denial = Denial(self._source, self._site, self._settings, self._problem.prior)
+
+    def _prior(self, at_tai_s: float) -> Prior:
+        if self._carried is None:
+            return make_prior(self._source, self._settings, at_tai_s)
+        return aged_prior(self._carried, self._source, self._site, self._settings, at_tai_s)
 
     def _correction(self) -> Correction | None:
         return None if self._solution is None else correction_of(self._solution.x)

@@ -6,7 +6,8 @@ The same object runs in the child process, inline in virtual time, and in a repl
 from dataclasses import dataclass
 from functools import partial
 
-from acu_daemon.assist.estimator import Estimator, EstimatorSettings, make_estimator
+from acu_daemon.assist.carry_over import CarryOver, aged_prior, first_fit
+from acu_daemon.assist.estimator import Estimator, EstimatorSettings, has_covariance, make_estimator
 from acu_daemon.assist.prediction import predict
 from acu_daemon.model import AxisLimits, FitResult, Prediction, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
@@ -15,7 +16,10 @@ from acu_daemon.pointing.keyhole import follow_path, longest_window_s
 
 @dataclass(frozen=True, slots=True)
 class RefitSetup:
-    """Everything that stays the same during a pass; it is sent to the child process once."""
+    """Everything that stays the same during a pass; it is sent to the child process once.
+
+    carried: what an earlier pass left, accepted (assist.carry_over); only estimators with a covariance use it.
+    """
 
     propagator: Propagator
     site: Site
@@ -23,6 +27,7 @@ class RefitSetup:
     settings: EstimatorSettings
     azimuth: AxisLimits
     step_s: float = 0.1
+    carried: CarryOver | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +43,11 @@ class RefitRequest:
 
 @dataclass(frozen=True, slots=True)
 class RefitReply:
-    """The newest fit, None before the first one is possible, and the buffer made from it."""
+    """The newest fit, None before the first one is possible, the buffer made from it, and what people should know."""
 
     fit: FitResult | None
     prediction: Prediction
+    notes: tuple[str, ...] = ()
 
 
 class Refitter:
@@ -49,10 +55,14 @@ class Refitter:
 
     def __init__(self, setup: RefitSetup) -> None:
         self._setup = setup
-        self._estimator: Estimator = make_estimator(setup.estimator, setup.propagator, setup.site, setup.settings)
+        self._estimator: Estimator = make_estimator(
+            setup.estimator, setup.propagator, setup.site, setup.settings, setup.carried
+        )
 
     def refit(self, request: RefitRequest) -> RefitReply:
-        """Take new readings, fit, and predict from the corrected orbit, or from the elements before any fit.
+        """Take new readings, fit, and predict from the corrected orbit.
+
+        Before the first fit the orbit is what an earlier pass left, else the elements' own.
 
         Raises: OrbitError: the propagator has no answer for the span.
         """
@@ -60,7 +70,9 @@ class Refitter:
             self._estimator.add(request.readings)
         fit = self._estimator.fit()
         setup = self._setup
-        propagator = setup.propagator if fit is None else setup.propagator.corrected(fit.correction)
+        notes, self._estimator.notes[:] = tuple(self._estimator.notes), ()
+        shown = self._before_fit(request.now_tai_s) if fit is None else fit
+        propagator = setup.propagator if shown is None else setup.propagator.corrected(shown.correction)
         prediction = predict(
             propagator,
             setup.site,
@@ -72,6 +84,13 @@ class Refitter:
             near_az_deg=request.near_az_deg,
             lead_in_s=longest_window_s(setup.azimuth),
             follow=partial(follow_path, azimuth=setup.azimuth),
-            fit=fit,
+            fit=shown,
         )
-        return RefitReply(fit, prediction)
+        return RefitReply(fit, prediction, notes)
+
+    def _before_fit(self, now_tai_s: float) -> FitResult | None:
+        setup = self._setup
+        if setup.carried is None or not has_covariance(setup.estimator):
+            return None
+        prior = aged_prior(setup.carried, setup.propagator, setup.site, setup.settings, now_tai_s)
+        return first_fit(setup.carried, prior)

@@ -1,0 +1,199 @@
+"""What one pass leaves to the next of the same satellite: the last fit, aged, as the next pass's prior.  Pure.
+
+The orbit's corrections hold wherever the satellite is seen from; the angle biases and the station's place are kept too
+where the next pass is seen by the same station.
+"""
+
+from dataclasses import dataclass, field
+from math import hypot
+
+import numpy as np
+
+from acu_daemon.assist.full_states import (
+    BROUWER_SIGMAS,
+    ORBIT,
+    STATE_COUNT,
+    Prior,
+    bias_of,
+    correction_of,
+    make_prior,
+    shift_of,
+    states_of,
+)
+from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings, StateSigmas
+from acu_daemon.errors import OrbitError
+from acu_daemon.model import AngleBias, Correction, FitResult, Site, Station
+from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.units import DAY_S, Array
+
+LEAST_READINGS = 30
+LONGEST_S = 10.0 * DAY_S  # after that, new elements' own uncertainty is as good
+WIDEST_SIGMAS = 5.0  # a correction beyond this many a-priori sigmas was no orbit's but another signal's
+SAME_M, SAME_M_S = 1.0, 1e-3
+
+_MEAN_ANOMALY, _MEAN_MOTION = 1, 2
+_SLOW = (0, 3, 4, 5, 6, 7, 8, 9)  # node, e-vector, inclination, biases: what drifts without a trend
+_SLOW_SHARE_PER_DAY = 0.1  # of the variance of new elements, of a new station's biases
+_WOBBLE_RAD = 1e-4  # 0.7 km along the track come and go within hours: what the analytical theories leave out
+_LONG_MEAN_MOTION_SHARE = 0.4  # of the a-priori sigma: what elements' mean motion is worth from pass to pass
+_LEAST_AGE_S = 0.5 * DAY_S
+
+
+@dataclass(frozen=True, slots=True)
+class CarryOver:
+    """The last fit of a pass, and which elements it corrects.
+
+    states: of the uncorrected elements at their epoch and at at_tai_s, (2, 6), TEME, metres and m/s: the same elements
+    give the same ones.
+    """
+
+    at_tai_s: float
+    estimator: str
+    station: Station
+    elements_kind: str
+    elements_epoch_tai_s: float
+    states: Array = field(compare=False, repr=False)
+    correction: Correction
+    bias: AngleBias
+    station_shift_enu_m: tuple[float, float, float]
+    covariance: Array = field(compare=False, repr=False)  # (13, 13), see full_states
+
+
+def carry_over_of(fit: FitResult, source: Propagator, site: Site) -> CarryOver | None:
+    """What a fit leaves to the next pass; None without a covariance or from too few readings.
+
+    Raises:  OrbitError: the source has no answer at its epoch.
+    """
+    if fit.covariance is None or fit.reading_count < LEAST_READINGS:
+        return None
+    return CarryOver(
+        at_tai_s=fit.at_tai_s,
+        estimator=fit.estimator,
+        station=site.station,
+        elements_kind=source.kind,
+        elements_epoch_tai_s=source.epoch_tai_s,
+        states=_states(source, fit.at_tai_s),
+        correction=fit.correction,
+        bias=fit.bias,
+        station_shift_enu_m=fit.station_shift_enu_m,
+        covariance=fit.covariance,
+    )
+
+
+def why_not(carried: CarryOver, source: Propagator, settings: EstimatorSettings, now_tai_s: float) -> str:
+    """Why a carry-over must be dropped; empty where it may be used."""
+    age_s = now_tai_s - carried.at_tai_s
+    if age_s < 0.0:
+        return "it is from a later time than now"
+    if age_s > LONGEST_S:
+        return f"it is {age_s / DAY_S:.1f} days old, the limit is {LONGEST_S / DAY_S:g}"
+    if not _has_same_elements(carried, source):
+        return "the elements have changed"
+    sigma = np.sqrt(np.diag(make_prior(source, settings, carried.at_tai_s).covariance))[ORBIT]
+    off = np.abs(_mean(carried)[ORBIT])
+    if (off > WIDEST_SIGMAS * sigma).any():
+        return f"its correction is more than {WIDEST_SIGMAS:g} sigma from the elements"
+    return ""
+
+
+def aged_prior(
+    carried: CarryOver, source: Propagator, site: Site, settings: EstimatorSettings, at_tai_s: float
+) -> Prior:
+    """What the carry-over tells of the states at at_tai_s, in place of `make_prior`.
+
+    The mean motion is first held to what elements are worth over days: within one pass its error looks like others',
+    and what a pass's noise leaves in it runs away until the next.  Then come drag, as a constant error of the mean
+    motion's rate from the fit on, and slow drifts.
+    """
+    fresh = make_prior(source, settings, at_tai_s)
+    mean, covariance = _held_to_long_mean_motion(_mean(carried), carried, settings)
+    covariance = covariance + _process_noise(carried, settings, np.diag(fresh.covariance), at_tai_s)
+    if carried.station != site.station:
+        mean, covariance = _orbit_alone(mean, covariance, fresh)
+    is_no_state = np.diag(fresh.covariance) == 0.0
+    mean[is_no_state] = 0.0
+    covariance[is_no_state], covariance[:, is_no_state] = 0.0, 0.0
+    return Prior(mean, covariance)
+
+
+def first_fit(carried: CarryOver, prior: Prior) -> FitResult:
+    """The prior in the shape of a fit without readings: what the first prediction of a pass is made from."""
+    return FitResult(
+        estimator=carried.estimator,
+        correction=correction_of(prior.mean),
+        at_tai_s=carried.at_tai_s,
+        reading_count=0,
+        rejected_count=0,
+        residual_rms_deg=0.0,
+        along_s=0.0,
+        across_deg=0.0,
+        bias=bias_of(prior.mean),
+        station_shift_enu_m=shift_of(prior.mean),
+        covariance=prior.covariance,
+    )
+
+
+def _states(source: Propagator, at_tai_s: float) -> Array:
+    r_m, v_m_s = source.corrected(Correction()).states_teme(np.array([source.epoch_tai_s, at_tai_s]))
+    states: Array = np.hstack((r_m, v_m_s))
+    return states
+
+
+def _has_same_elements(carried: CarryOver, source: Propagator) -> bool:
+    if (carried.elements_kind, carried.elements_epoch_tai_s) != (source.kind, source.epoch_tai_s):
+        return False
+    try:
+        off = np.abs(_states(source, carried.at_tai_s) - carried.states)
+    except OrbitError:
+        return False
+    return bool((off[:, :3] < SAME_M).all() and (off[:, 3:] < SAME_M_S).all())
+
+
+def _mean(carried: CarryOver) -> Array:
+    return states_of(carried.correction, carried.bias, carried.station_shift_enu_m)
+
+
+def _element_sigmas(carried: CarryOver, settings: EstimatorSettings) -> ElementSigmas:
+    if isinstance(settings.orbit_sigmas, ElementSigmas):
+        return settings.orbit_sigmas
+    return BROUWER_SIGMAS if carried.elements_kind == "brouwer" else ElementSigmas()
+
+
+def _held_to_long_mean_motion(mean: Array, carried: CarryOver, settings: EstimatorSettings) -> tuple[Array, Array]:
+    """Observe the mean motion's correction as zero.
+
+    1 sigma: a share of the a-priori one, or, where elements were far off along the track, the rate that brought them
+    there since their epoch.  Without it where the configuration says what the elements are worth.
+    """
+    covariance = carried.covariance
+    if isinstance(settings.orbit_sigmas, StateSigmas):
+        return mean, covariance
+    since_s = carried.at_tai_s - carried.elements_epoch_tai_s
+    along_rad = mean[_MEAN_ANOMALY] + mean[_MEAN_MOTION] * since_s
+    share_rad_s = _LONG_MEAN_MOTION_SHARE * _element_sigmas(carried, settings).mean_motion_rad_min / 60.0
+    sigma_rad_s = hypot(share_rad_s, float(along_rad) / max(abs(since_s), _LEAST_AGE_S))
+    gain = covariance[:, _MEAN_MOTION] / (covariance[_MEAN_MOTION, _MEAN_MOTION] + sigma_rad_s**2)
+    return mean - gain * mean[_MEAN_MOTION], covariance - np.outer(gain, covariance[_MEAN_MOTION])
+
+
+def _process_noise(carried: CarryOver, settings: EstimatorSettings, fresh_variance: Array, at_tai_s: float) -> Array:
+    """What the time since the fit adds to the covariance (13, 13) of the states, which are those at epoch."""
+    passed_s, since_epoch_s = max(0.0, at_tai_s - carried.at_tai_s), at_tai_s - carried.elements_epoch_tai_s
+    noise = np.zeros((STATE_COUNT, STATE_COUNT))
+    slow = list(_SLOW)
+    noise[slow, slow] = _SLOW_SHARE_PER_DAY * passed_s / DAY_S * fresh_variance[slow]
+    noise[_MEAN_ANOMALY, _MEAN_ANOMALY] = _WOBBLE_RAD**2
+    drag = np.zeros(STATE_COUNT)  # of a unit of the mean motion's rate: 1/2 t^2 along the track at at_tai_s
+    drag[_MEAN_MOTION] = passed_s
+    drag[_MEAN_ANOMALY] = passed_s**2 / 2.0 - passed_s * since_epoch_s
+    rate_rad_s2 = _element_sigmas(carried, settings).mean_motion_per_day_rad_min / 60.0 / DAY_S
+    total: Array = noise + rate_rad_s2**2 * np.outer(drag, drag)
+    return total
+
+
+def _orbit_alone(mean: Array, covariance: Array, fresh: Prior) -> tuple[Array, Array]:
+    """The orbit's part; the station's comes from the fresh prior."""
+    new_mean, new_covariance = fresh.mean.copy(), fresh.covariance.copy()
+    new_mean[ORBIT] = mean[ORBIT]
+    new_covariance[ORBIT, ORBIT] = covariance[ORBIT, ORBIT]
+    return new_mean, new_covariance

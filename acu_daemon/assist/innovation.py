@@ -1,0 +1,60 @@
+"""Whether readings deny a carried orbit: their innovations against what it and its covariance allow.  Pure."""
+
+import numpy as np
+
+from acu_daemon.assist.full_path import node_times, orbit_partials_itrs, path_itrs, site_of, sky_partials
+from acu_daemon.assist.full_points import Sights, residuals
+from acu_daemon.assist.full_states import STATION, Prior
+from acu_daemon.assist.settings import EstimatorSettings
+from acu_daemon.model import Site
+from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.units import Array
+
+WIDEST_SIGMAS = 5.0
+DENIED_S = 60.0  # as long as every reading lies beyond
+LEAST_READINGS = 10  # so many of them
+LONGEST_GAP_S = 10.0  # a minute with a longer gap between two readings is no minute of readings
+
+
+class Denial:
+    """Watches the readings of a pass against its prior.  Mutable; one owner."""
+
+    def __init__(self, source: Propagator, site: Site, settings: EstimatorSettings, prior: Prior) -> None:
+        self._source = source
+        self._site = site
+        self._settings = settings
+        self._prior = prior
+        self._beyond: list[float] = []  # times of the newest readings without one inside between them
+
+    def sees(self, seen: Sights) -> bool:
+        """Take new readings, oldest first; say whether a minute of them denies the prior.
+
+        Raises:  OrbitError: the source has no answer for one of their times.
+        """
+        for tai_s, sigmas in zip(seen.tai_s.tolist(), self.sigmas(seen).tolist(), strict=True):
+            is_gap = bool(self._beyond) and tai_s - self._beyond[-1] > LONGEST_GAP_S
+            if sigmas <= WIDEST_SIGMAS or is_gap:
+                self._beyond = []
+            if sigmas > WIDEST_SIGMAS:
+                self._beyond.append(tai_s)
+            if len(self._beyond) >= LEAST_READINGS and tai_s - self._beyond[0] >= DENIED_S:
+                return True
+        return False
+
+    def sigmas(self, seen: Sights) -> Array:
+        """How far each reading is from the prior's direction, in sigmas of both together, (N,)."""
+        prior = self._prior
+        nodes, here = node_times(float(seen.tai_s[0]), float(seen.tai_s[-1])), site_of(self._site, prior.mean)
+        path = path_itrs(self._source, prior.mean, self._site, nodes)
+        left = residuals(path, here, prior.mean, self._settings, seen)
+        noise = np.square(left.noise_rad / left.noise_scale)
+        partials = orbit_partials_itrs(self._source, prior.mean, self._site, nodes).at(seen.tai_s)
+        has_shift = bool(prior.covariance[STATION, STATION].any())
+        h = sky_partials(path.at(seen.tai_s), partials, here, has_shift)
+        moved = np.tensordot(prior.covariance, h, 1)
+        across = np.sum(h[..., 0] * moved[..., 0], axis=0) + noise[:, 0]
+        both = np.sum(h[..., 0] * moved[..., 1], axis=0)
+        upward = np.sum(h[..., 1] * moved[..., 1], axis=0) + noise[:, 1]
+        x, y = left.off_rad.T
+        sigmas: Array = np.sqrt((x * x * upward - 2.0 * both * x * y + y * y * across) / (across * upward - both**2))
+        return sigmas
