@@ -20,7 +20,7 @@ def azimuth_model_deg(el_deg: Array, range_km: Array) -> Array:
 
 
 def elevation_model_deg(el_deg: Array) -> Array:
-    """Bias in elevation (eq 25), (N,), and sigma of its noise too: eq 23 as printed has C3 rho sin h, 20 degrees."""
+    """Bias in elevation (eq 25), (N,), and sigma of its noise too: eq 23 as printed has C3 rho sin h, some degrees."""
     el = np.radians(el_deg)
     model: Array = 0.05 + 0.001 / np.sin(el) + 0.01 / np.tan(el)
     return model
