@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from acu_daemon.assist.estimator import EstimatorSettings
+from acu_daemon.assist.settings import StateSigmas
 from acu_daemon.config_problems import in_words
 from acu_daemon.control.state import ControlConfig
 from acu_daemon.edge.link import make_link
@@ -302,7 +303,7 @@ def control_config(station: StationFile, satellite: SatelliteFile, byte_time_s: 
     )
 
 
-def estimator_settings(station: StationFile) -> EstimatorSettings:
+def estimator_settings(station: StationFile, satellite: SatelliteFile) -> EstimatorSettings:
     """What the estimators need of the configuration."""
     return EstimatorSettings(
         sigma_azimuth_deg=station.readings.sigma_azimuth_deg,
@@ -311,4 +312,17 @@ def estimator_settings(station: StationFile) -> EstimatorSettings:
         beamwidth_deg=station.receiver.beamwidth_deg,
         azimuth=station.acu.azimuth.limits(),
         elevation=station.acu.elevation.limits(),
+        bias_sigma_azimuth_deg=station.readings.bias_sigma_azimuth_deg,
+        bias_sigma_elevation_deg=station.readings.bias_sigma_elevation_deg,
+        orbit_sigmas=_orbit_sigmas(satellite.uncertainty),
+        station_sigma_m=station.station.uncertainty_m / 2**0.5,  # of east and of north each
     )
+
+
+def _orbit_sigmas(given: UncertaintySection) -> StateSigmas | None:
+    """The satellite's own a-priori; None where the file says nothing: then the kind and age of the elements say it."""
+    if given.position_km is None and given.velocity_m_s is None:
+        return None
+    position_m = given.position_km * 1e3 if given.position_km is not None else (given.velocity_m_s or 0.0) * 1e3
+    velocity_m_s = given.velocity_m_s if given.velocity_m_s is not None else position_m * 1e-3  # a low orbit's motion
+    return StateSigmas(position_m, velocity_m_s)

@@ -291,7 +291,7 @@ def test_the_rooms_get_what_the_files_say(tmp_path: Path) -> None:
     assert not control.is_armed
     assert (control.hold_s, control.search_s, control.acquire_s) == (7, 8, 9)
     assert (control.azimuth.min_deg, control.elevation.max_rate_deg_s) == (-270.0, 5.0)
-    settings = estimator_settings(station)
+    settings = estimator_settings(station, satellite)
     assert (settings.max_fit_elevation_deg, settings.sigma_azimuth_deg) == (70, 0.02)
     assert settings.azimuth == control.azimuth
     assert (station.site.station.latitude_deg, station.site.station.height_m) == (-15.53, 277.0)

@@ -100,15 +100,6 @@ def test_before_any_reading_there_is_no_fit(name):
     assert estimator.fit() is None
 
 
-def test_full_runs_kalman_and_the_fit_says_so():
-    source, where = circular(), site()
-    estimator = make_estimator("full", source, where, SETTINGS)
-    estimator.add(_readings(source, where))
-    fit = estimator.fit()
-    assert fit is not None
-    assert (estimator.name, fit.estimator) == ("kalman", "kalman")
-
-
 def test_an_unknown_estimator_is_refused_with_the_names_that_exist():
     with pytest.raises(UsageError, match="expected one of circular, deterministic, kalman, full"):
         make_estimator("best", circular(), site(), SETTINGS)

@@ -337,7 +337,7 @@ def test_a_prediction_carries_its_sigma_from_the_refit_on():
     source, where = circular(66.0, 0.001), site(4.0)
     tai_s = visible(source, where, 1.0)[:60]
     readings = Readings(tai_s, *_shown(source, where, tai_s, AngleBias()))
-    setup = RefitSetup(source, where, "six", SETTINGS, AxisLimits(-270.0, 270.0, 20.0, 10.0))
+    setup = RefitSetup(source, where, "full", SETTINGS, AxisLimits(-270.0, 270.0, 20.0, 10.0))
     refitter = Refitter(setup)
     nothing = Readings(np.empty(0), np.empty(0), np.empty(0))
     before = refitter.refit(RefitRequest(nothing, tai_s[0], 90.0, tai_s[0], 180.0))

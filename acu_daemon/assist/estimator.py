@@ -37,8 +37,7 @@ ESTIMATORS: dict[str, Callable[[Propagator, Site, EstimatorSettings], Estimator]
     "circular": CircularEstimator,
     "deterministic": DeterministicEstimator,
     "kalman": KalmanEstimator,
-    "full": KalmanEstimator,  # the result names the method that ran
-    "six": FullEstimator,
+    "full": FullEstimator,
 }
 
 
@@ -52,7 +51,7 @@ def make_estimator(
 ) -> Estimator:
     """Make an estimator that corrects a source.
 
-    name: circular, deterministic, kalman or full; `full` runs `kalman`, and the caller says so (see `Estimator.name`).
+    name: circular, deterministic, kalman or full.
     carried: what an earlier pass left, an accepted one; without a meaning for estimators without covariance.
     Raises:  UsageError: no such estimator.
     """

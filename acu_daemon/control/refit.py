@@ -9,7 +9,7 @@ from functools import partial
 from acu_daemon.assist.carry_over import CarryOver, aged_prior, first_fit
 from acu_daemon.assist.estimator import Estimator, EstimatorSettings, has_covariance, make_estimator
 from acu_daemon.assist.prediction import predict
-from acu_daemon.model import AxisLimits, FitResult, Prediction, Readings, Site
+from acu_daemon.model import AxisLimits, FitResult, Prediction, PredictionKind, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.pointing.keyhole import follow_path, longest_window_s
 
@@ -72,20 +72,7 @@ class Refitter:
         setup = self._setup
         notes, self._estimator.notes[:] = tuple(self._estimator.notes), ()
         shown = self._before_fit(request.now_tai_s) if fit is None else fit
-        propagator = setup.propagator if shown is None else setup.propagator.corrected(shown.correction)
-        prediction = predict(
-            propagator,
-            setup.site,
-            request.start_tai_s,
-            made_at_tai_s=request.now_tai_s,
-            kind="TLE" if fit is None else "FITTED",
-            horizon_s=request.horizon_s,
-            step_s=setup.step_s,
-            near_az_deg=request.near_az_deg,
-            lead_in_s=longest_window_s(setup.azimuth),
-            follow=partial(follow_path, azimuth=setup.azimuth),
-            fit=shown,
-        )
+        prediction = predict_from(setup, shown, request, kind="TLE" if fit is None else "FITTED")
         return RefitReply(fit, prediction, notes)
 
     def _before_fit(self, now_tai_s: float) -> FitResult | None:
@@ -94,3 +81,23 @@ class Refitter:
             return None
         prior = aged_prior(setup.carried, setup.propagator, setup.site, setup.settings, now_tai_s)
         return first_fit(setup.carried, prior)
+
+
+def predict_from(setup: RefitSetup, fit: FitResult | None, request: RefitRequest, kind: PredictionKind) -> Prediction:
+    """Make the buffer from the orbit that a fit found, or from the elements alone.
+
+    Raises: OrbitError: the propagator has no answer for the span.
+    """
+    return predict(
+        setup.propagator if fit is None else setup.propagator.corrected(fit.correction),
+        setup.site,
+        request.start_tai_s,
+        made_at_tai_s=request.now_tai_s,
+        kind=kind,
+        horizon_s=request.horizon_s,
+        step_s=setup.step_s,
+        near_az_deg=request.near_az_deg,
+        lead_in_s=longest_window_s(setup.azimuth),
+        follow=partial(follow_path, azimuth=setup.azimuth),
+        fit=fit,
+    )
