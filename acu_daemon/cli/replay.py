@@ -41,15 +41,13 @@ def command(
         raise UsageError(f"{readings}: no readings below the header")
     target = load_target(config, satellite, lines[0][2])
     name = estimator or target.station.tracking.estimator
-    if name == "full":
-        typer.echo("estimator full does not exist yet: kalman runs in its place", err=True)
     for warning in target.elements.warnings:
         typer.echo(f"warning: {warning}", err=True)
     setup = RefitSetup(
         target.elements.propagator,
         target.station.site,
         name,
-        estimator_settings(target.station),
+        estimator_settings(target.station, target.satellite),
         target.station.acu.azimuth.limits(),
     )
     on_progress = _progress(len(lines)) if sys.stderr.isatty() else None

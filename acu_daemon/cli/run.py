@@ -8,6 +8,7 @@ import signal
 import sys
 import time
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,12 +16,15 @@ import structlog
 import typer
 
 from acu_daemon import PROCESS_START_S
+from acu_daemon.assist.carry_over import CarryOver, carry_over_of, why_not
+from acu_daemon.assist.estimator import has_covariance
 from acu_daemon.cli.options import At, AtMonotonic, Config, Satellite, Target, coming_pass, load_target, make_clock
 from acu_daemon.config import control_config, estimator_settings
 from acu_daemon.control.refit import RefitSetup
 from acu_daemon.daemon.area import Snapshot
 from acu_daemon.daemon.live import LiveLine
 from acu_daemon.daemon.service import Outcome, PassJob, Service
+from acu_daemon.edge.carry_over import FitKeeper, carry_over_path, read_carry_over
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.fit import ProcessFitRunner
 from acu_daemon.edge.link import Link, check_rate, make_link
@@ -63,7 +67,8 @@ def command(
     coming = coming_pass(target, clock.tai_s())
     link = make_link(target.station.acu.url)
     check_rate(link, target.station.acu.period_s, target.station.acu.device_delay_s)
-    snapshots = SnapshotFile(state_directory(state, is_rehearsal=clock.is_rehearsal))
+    directory = state_directory(state, is_rehearsal=clock.is_rehearsal)
+    snapshots = SnapshotFile(directory)
     live = LiveLine() if sys.stderr.isatty() else None
     configure_logs(
         clock.tai_s,
@@ -73,15 +78,47 @@ def command(
     )
     end_tai_s = math.inf if duration is None else clock.tai_s() + duration - (time.monotonic() - PROCESS_START_S)
     _announce(target, coming, clock)
-    job = make_job(target, coming, link, is_rehearsal=clock.is_rehearsal, end_tai_s=end_tai_s)
+    kept = carry_over_path(directory, target.satellite.satellite.norad_id, target.satellite.satellite.name)
+    carried = _carried(target, kept, clock.tai_s())
+    job = make_job(target, coming, link, is_rehearsal=clock.is_rehearsal, end_tai_s=end_tai_s, carried=carried)
     with RecordingWriter(record) if record is not None else contextlib.nullcontext() as recording:
-        outcome = asyncio.run(_run(job, link, clock, live, recording, snapshots))
+        outcome = asyncio.run(_run(job, link, clock, live, recording, snapshots, _keeper(target, kept)))
     structlog.get_logger("run").info("run.done", **asdict(outcome))
     if outcome.has_begun and not outcome.has_acquired and outcome.reason != "SIGTERM":
         raise typer.Exit(1)
 
 
-def make_job(target: Target, coming: Pass, link: Link, *, is_rehearsal: bool, end_tai_s: float = math.inf) -> PassJob:
+def _carried(target: Target, path: Path, now_tai_s: float) -> CarryOver | None:
+    """What the last pass of the satellite left, where it may be used."""
+    carried = read_carry_over(path) if has_covariance(target.station.tracking.estimator) else None
+    if carried is None:
+        return None
+    log: Any = structlog.get_logger("carry_over")
+    reason = why_not(
+        carried, target.elements.propagator, estimator_settings(target.station, target.satellite), now_tai_s
+    )
+    if reason:
+        log.warning("carry_over.dropped", reason=reason, file=str(path))
+        return None
+    parts = "orbit and biases" if carried.station == target.station.site.station else "orbit"
+    log.info("carry_over.used", age_h=round((now_tai_s - carried.at_tai_s) / 3600.0, 2), of=parts)
+    return carried
+
+
+def _keeper(target: Target, path: Path) -> FitKeeper:
+    make = partial(carry_over_of, source=target.elements.propagator, site=target.station.site)
+    return FitKeeper(path, target.elements.label, make)
+
+
+def make_job(
+    target: Target,
+    coming: Pass,
+    link: Link,
+    *,
+    is_rehearsal: bool,
+    end_tai_s: float = math.inf,
+    carried: CarryOver | None = None,
+) -> PassJob:
     """What the files say, as the daemon needs it."""
     station = target.station
     return PassJob(
@@ -89,8 +126,9 @@ def make_job(target: Target, coming: Pass, link: Link, *, is_rehearsal: bool, en
             target.elements.propagator,
             station.site,
             station.tracking.estimator,
-            estimator_settings(station),
+            estimator_settings(station, target.satellite),
             station.acu.azimuth.limits(),
+            carried=carried,
         ),
         control=control_config(station, target.satellite, link.byte_time_s),
         coming=coming,
@@ -105,13 +143,13 @@ def make_job(target: Target, coming: Pass, link: Link, *, is_rehearsal: bool, en
 
 def _announce(target: Target, coming: Pass, clock: SystemClock) -> None:
     log: Any = structlog.get_logger("run")
-    tracking = target.station.tracking
     log.info(
         "run.start",
         satellite=target.elements.label,
         station=target.station.station.name,
         acu=target.station.acu.url,
         elements=target.elements.propagator.kind,
+        estimator=target.station.tracking.estimator,
         elements_age_days=round((clock.tai_s() - target.elements.epoch_tai_s) / 86400.0, 2),
         rise=utc_text(coming.rise_tai_s, 0),
         set=utc_text(coming.set_tai_s, 0),
@@ -119,8 +157,6 @@ def _announce(target: Target, coming: Pass, clock: SystemClock) -> None:
     )
     for warning in target.elements.warnings:
         log.warning("elements.warning", reason=warning)
-    if tracking.estimator == "full":
-        log.info("estimator.stand_in", asked="full", runs="kalman", reason="`full` does not exist yet")
     if target.station.safety.arm == "manual":
         log.warning("run.disarmed", reason='[safety] arm = "manual": nothing is written to the ACU')
 
@@ -132,6 +168,7 @@ async def _run(
     live: LiveLine | None,
     recording: RecordingWriter | None,
     snapshots: SnapshotFile,
+    keeper: FitKeeper,
 ) -> Outcome:
     def show(seen: Snapshot) -> None:
         snapshots.write(asdict(seen))
@@ -145,6 +182,7 @@ async def _run(
         ProcessFitRunner(job.refit),
         on_snapshot=show,
         on_reading=recording.add if recording else None,
+        keeper=keeper,
     )
     loop = asyncio.get_running_loop()
     for number in (signal.SIGTERM, signal.SIGINT):

@@ -8,7 +8,7 @@ import numpy as np
 from acu_daemon.assist.gate import Dwell
 from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup, Refitter
 from acu_daemon.control.states import TrackState
-from acu_daemon.model import Reading, Readings
+from acu_daemon.model import FitResult, Reading, Readings
 
 BUFFER_S = 2.0  # after its end, and with new readings, a fresh one is made
 REFIT_PERIOD_S = 0.5  # at any rate of readings, a refit then comes at least once a second of data, or on every line
@@ -22,6 +22,7 @@ class Replayed:
     el_deg: float
     sigma_deg: float | None
     source: TrackState
+    fit: FitResult | None = None  # the newest one then
 
 
 def replay(
@@ -80,7 +81,7 @@ def _line(reply: RefitReply, tai_s: float, source: TrackState) -> Replayed:
     if prediction.sigma_deg is not None:
         index = min(round((tai_s - prediction.start_tai_s) / prediction.step_s), prediction.sigma_deg.size - 1)
         sigma_deg = float(prediction.sigma_deg[index])
-    return Replayed(point.az_deg % 360.0, point.el_deg, sigma_deg, source)
+    return Replayed(point.az_deg % 360.0, point.el_deg, sigma_deg, source, reply.fit)
 
 
 def _state(is_fitted: bool, is_acquired: bool, has_acquired: bool) -> TrackState:

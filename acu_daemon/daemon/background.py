@@ -1,18 +1,20 @@
 """The background: fits the orbit to locked readings and keeps the prediction buffer filled (seed 001, 2.5)."""
 
 import asyncio
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import structlog
 
-from acu_daemon.control.refit import RefitReply, RefitRequest
+from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup, predict_from
 from acu_daemon.control.state import PassPlan
 from acu_daemon.control.states import AUTOTRACKING, HOLDING, TrackState
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.fit import FitFailedError, FitRunner
 from acu_daemon.errors import OrbitError
+from acu_daemon.model import FitResult
 
 REFIT_PERIOD_S = 1.0  # an accepted fit replaces the buffer at least once a second while locked
 PAST_S = 1.0  # the buffer starts this long before now: readings are compared at the time of their sample
@@ -27,17 +29,21 @@ class Background:
         area: CommonArea,
         runner: FitRunner,
         clock: Clock,
+        setup: RefitSetup,
         *,
         horizon_s: float,
         low_water_s: float,
         preposition_s: float,
+        on_fit: Callable[[FitResult], None] | None = None,
     ) -> None:
         self._area = area
         self._runner = runner
         self._clock = clock
+        self._setup = setup
         self._horizon_s = horizon_s
         self._low_water_s = low_water_s
         self._preposition_s = preposition_s
+        self._on_fit = on_fit
         self._wake = asyncio.Event()
         self._last_tai_s = -1e18
         self._seen: TrackState | None = None
@@ -83,8 +89,21 @@ class Background:
         except (FitFailedError, OrbitError) as error:
             area.refit_failed_count += 1
             self._log.warning("fit.failed", reason=str(error))
+            self._predict_here(request)
             return
         self._take(reply)
+
+    def _predict_here(self, request: RefitRequest) -> None:
+        """Without the fit process: keep the buffer filled from the last fit, else the elements; 2 ms in the loop."""
+        sky = self._area.sky
+        if sky.prediction is not None and sky.prediction.end_tai_s - request.now_tai_s > self._low_water_s:
+            return
+        try:
+            prediction = predict_from(self._setup, sky.fit, request, "TLE" if sky.fit is None else "FITTED")
+        except OrbitError as error:
+            self._log.warning("prediction.failed", reason=str(error))
+            return
+        self._area.sky = replace(sky, prediction=prediction)
 
     def _request(self, now_tai_s: float) -> RefitRequest:
         area = self._area
@@ -121,6 +140,10 @@ class Background:
                 along_s=round(reply.fit.along_s, 3),
                 across_deg=round(reply.fit.across_deg, 4),
             )
+        for note in reply.notes:
+            self._log.warning("fit.note", note=note)
+        if reply.fit is not None and self._on_fit is not None:
+            self._on_fit(reply.fit)
         area.refit_count += 1
         area.sky = replace(area.sky, prediction=reply.prediction, fit=reply.fit)
 

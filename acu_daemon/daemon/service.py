@@ -4,7 +4,7 @@ import asyncio
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import structlog
 
@@ -20,7 +20,7 @@ from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.fit import FitRunner
 from acu_daemon.edge.link import Link
 from acu_daemon.errors import NoAcuError, UsageError
-from acu_daemon.model import Pass, Reading, sky_angle_deg
+from acu_daemon.model import FitResult, Pass, Reading, sky_angle_deg
 
 FIRST_POLL_S = 10.0  # no good poll within this of the start ends the run
 STOP_DEADLINE_S = 1.0
@@ -62,6 +62,16 @@ class Outcome:
     lateness_p99_ms: float
 
 
+class FitKeeper(Protocol):
+    """Keeps the newest accepted fit beyond the pass, beside the loop; owned by the service."""
+
+    def offer(self, fit: FitResult) -> None: ...
+
+    def close(self) -> None: ...
+
+    async def run(self) -> None: ...
+
+
 class Service:
     """Everything of one run.  `stop` ends it early and safely."""
 
@@ -74,11 +84,13 @@ class Service:
         *,
         on_snapshot: Callable[[Snapshot], None] | None = None,
         on_reading: Callable[[Reading], None] | None = None,
+        keeper: FitKeeper | None = None,
     ) -> None:
         self._job = job
         self._clock = clock
         self._runner = runner
         self._on_snapshot = on_snapshot
+        self._keeper = keeper
         self._ticked = asyncio.Event()
         self._stop_reason = ""
         self._log: Any = structlog.get_logger("pass")
@@ -88,9 +100,11 @@ class Service:
             self._area,
             runner,
             clock,
+            job.refit,
             horizon_s=job.horizon_s,
             low_water_s=job.low_water_s,
             preposition_s=job.control.preposition_s,
+            on_fit=keeper.offer if keeper else None,
         )
         self._foreground = Foreground(
             self._area, self._port, clock, job.control, after_tick=self._after_tick, on_reading=on_reading
@@ -109,12 +123,16 @@ class Service:
         reason, is_stopped = "error", False
         try:
             async with asyncio.TaskGroup() as outer:
-                keeper = outer.create_task(self._port.keep(), name="link")
+                link = outer.create_task(self._port.keep(), name="link")
+                if self._keeper is not None:
+                    outer.create_task(self._keeper.run(), name="fit keeper")
                 try:
                     reason = await self._track()
                 finally:
                     is_stopped = await self._safe_stop()
-                    keeper.cancel()
+                    link.cancel()
+                    if self._keeper is not None:
+                        self._keeper.close()
                     await self._runner.close()
         except ExceptionGroup as group:
             raise _innermost(group) from None

@@ -1,0 +1,80 @@
+"""Estimators side by side on one recording: how far each one's predictions are from the readings.  Pure."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from acu_daemon.assist.gate import Dwell
+from acu_daemon.control.replay import Replayed
+from acu_daemon.model import FitResult, Reading, sky_angle_deg
+from acu_daemon.units import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """Angles on the sky between prediction and reading, (N,), at the lines that are compared."""
+
+    tai_s: Array
+    error_deg: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Estimators by name.
+
+    is_held_back: the compared readings are those without lock after the first one with, which no estimator has seen;
+    else those with lock, each predicted from the ones up to a second before.
+    """
+
+    is_held_back: bool
+    errors: dict[str, Errors]
+    last_fit: dict[str, FitResult | None]
+
+    @property
+    def line_count(self) -> int:
+        return next(iter(self.errors.values())).tai_s.size
+
+
+def compare(
+    lines: list[tuple[float, Reading | None]], results: dict[str, list[Replayed]], lock_dwell_s: float
+) -> Comparison:
+    """Compare at the same lines for all: with angles, and after the first fit of every estimator that has one."""
+    held_back, locked = _kinds(lines, lock_dwell_s)
+    begin = max(_first_fit(one) for one in results.values())
+    is_held_back = any(k >= begin for k in held_back)
+    chosen = [k for k in (held_back if is_held_back else locked) if k >= begin]
+    return Comparison(
+        is_held_back=is_held_back,
+        errors={name: _errors(lines, one, chosen) for name, one in results.items()},
+        last_fit={name: one[-1].fit if one else None for name, one in results.items()},
+    )
+
+
+def _kinds(lines: list[tuple[float, Reading | None]], lock_dwell_s: float) -> tuple[list[int], list[int]]:
+    """Lines with angles: without lock after the first lock, and locked for the dwell."""
+    dwell = Dwell(lock_dwell_s)
+    held_back: list[int] = []
+    locked: list[int] = []
+    for k, (_, reading) in enumerate(lines):
+        if reading is None:
+            continue
+        if dwell.is_locked(reading):
+            locked.append(k)
+        elif locked and not reading.is_locked:
+            held_back.append(k)
+    return held_back, locked
+
+
+def _first_fit(results: list[Replayed]) -> int:
+    return next((k for k, one in enumerate(results) if one.fit is not None), 0)
+
+
+def _errors(lines: list[tuple[float, Reading | None]], results: list[Replayed], chosen: list[int]) -> Errors:
+    rows = []
+    for k in chosen:
+        tai_s, reading = lines[k]
+        if reading is not None:
+            seen = results[k]
+            rows.append((tai_s, sky_angle_deg(reading.az_deg, reading.el_deg, seen.az_deg, seen.el_deg)))
+    tai, error = np.array(rows, dtype=np.float64).reshape(-1, 2).T
+    return Errors(tai, error)

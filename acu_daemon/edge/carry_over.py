@@ -1,0 +1,188 @@
+"""The carry-over of a satellite in the state directory: one JSON file, whole at any time, written only here."""
+
+import asyncio
+import contextlib
+import json
+import math
+import os
+import re
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import structlog
+
+from acu_daemon.assist.carry_over import CarryOver
+from acu_daemon.assist.full_states import STATE_COUNT
+from acu_daemon.model import AngleBias, Correction, FitResult, Station
+from acu_daemon.orbit.timescales import utc_text
+from acu_daemon.units import Array
+
+VERSION = 1
+SAVE_PERIOD_S = 10.0  # so much of a pass a crash may lose
+_LARGEST_BYTES = 100_000
+_LEAST_EIGENVALUE = -1e-6  # of the correlations: rounding
+
+
+def carry_over_path(directory: Path, norad_id: int | None, name: str) -> Path:
+    """The file of a satellite: by its catalogue number, else by its name."""
+    label = str(norad_id) if norad_id is not None else re.sub(r"[^\w.-]+", "-", name)
+    return directory / f"carry-over-{label}.json"
+
+
+def read_carry_over(path: Path) -> CarryOver | None:
+    """Read the file; None where there is none, or, with a log line, where it cannot be used."""
+    try:
+        with path.open("rb") as file:
+            text = file.read(_LARGEST_BYTES)
+        return _from_json(json.loads(text))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
+        reason = f"{type(error).__name__}: {error}"
+        structlog.get_logger("carry_over").warning("carry_over.unreadable", file=str(path), reason=reason)
+        return None
+
+
+def write_carry_over(path: Path, satellite: str, carried: CarryOver) -> None:
+    """Put the file in place, whole: written beside it, on the disk, renamed.  OSError: it cannot be."""
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        with unfinished.open("w", encoding="ascii") as file:
+            json.dump(_to_json(satellite, carried), file, indent=1, allow_nan=False)
+            file.flush()
+            os.fsync(file.fileno())
+        unfinished.replace(path)
+    except OSError:
+        with contextlib.suppress(OSError):
+            unfinished.unlink()
+        raise
+    directory = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(directory)
+    finally:
+        os.close(directory)
+
+
+class FitKeeper:
+    """Saves the newest fit of a pass, at most once in ten seconds, and at the end.
+
+    The loop never waits for the disk.  A write that fails is logged once and never stops a pass.
+    """
+
+    def __init__(self, path: Path, satellite: str, carry_over_of: Callable[[FitResult], CarryOver | None]) -> None:
+        self._path = path
+        self._satellite = satellite
+        self._carry_over_of = carry_over_of
+        self._newest: FitResult | None = None
+        self._offered = asyncio.Event()
+        self._closing = asyncio.Event()
+        self._has_failed = False
+
+    def offer(self, fit: FitResult) -> None:
+        """Take an accepted fit."""
+        self._newest = fit
+        self._offered.set()
+
+    def close(self) -> None:
+        """Let `run` save what is not saved yet, and end."""
+        self._closing.set()
+        self._offered.set()
+
+    async def run(self) -> None:
+        """Save until closed."""
+        while True:
+            await self._offered.wait()
+            self._offered.clear()
+            newest, self._newest = self._newest, None
+            if newest is not None:
+                await asyncio.to_thread(self._save, newest)
+            if self._closing.is_set() and self._newest is None:
+                return
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(SAVE_PERIOD_S):
+                    await self._closing.wait()
+
+    def _save(self, fit: FitResult) -> None:
+        carried = self._carry_over_of(fit)
+        if carried is None:
+            return
+        try:
+            write_carry_over(self._path, self._satellite, carried)
+        except (OSError, ValueError) as error:
+            if not self._has_failed:
+                self._has_failed = True
+                structlog.get_logger("carry_over").warning(
+                    "carry_over.not_saved", file=str(self._path), reason=str(error)
+                )
+
+
+def _to_json(satellite: str, carried: CarryOver) -> dict[str, Any]:
+    return {
+        "version": VERSION,
+        "satellite": satellite,
+        "utc": utc_text(carried.at_tai_s),
+        "at_tai_s": carried.at_tai_s,
+        "estimator": carried.estimator,
+        "station": asdict(carried.station),
+        "elements": {
+            "kind": carried.elements_kind,
+            "epoch_utc": utc_text(carried.elements_epoch_tai_s),
+            "epoch_tai_s": carried.elements_epoch_tai_s,
+            "states_teme_m_m_s": carried.states.tolist(),
+        },
+        "correction": asdict(carried.correction),
+        "bias": asdict(carried.bias),
+        "station_shift_enu_m": list(carried.station_shift_enu_m),
+        "covariance": carried.covariance.tolist(),
+    }
+
+
+def _from_json(read: Any) -> CarryOver:
+    """Raises: ValueError, TypeError, KeyError: what is wrong."""
+    if not isinstance(read, dict) or read.get("version") != VERSION:
+        raise ValueError(f"expected a JSON object with version {VERSION}")
+    elements, station = read["elements"], read["station"]
+    east_m, north_m, up_m = _numbers(read["station_shift_enu_m"], (3,)).tolist()
+    return CarryOver(
+        at_tai_s=_number(read["at_tai_s"]),
+        estimator=str(read["estimator"]),
+        station=Station(str(station.pop("name")), **_fields(station)),
+        elements_kind=str(elements["kind"]),
+        elements_epoch_tai_s=_number(elements["epoch_tai_s"]),
+        states=_numbers(elements["states_teme_m_m_s"], (2, 6)),
+        correction=Correction(**_fields(read["correction"])),
+        bias=AngleBias(**_fields(read["bias"])),
+        station_shift_enu_m=(east_m, north_m, up_m),
+        covariance=_covariance(read["covariance"]),
+    )
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ValueError(f"{value!r}: expected a number")
+    return float(value)
+
+
+def _fields(values: dict[str, Any]) -> dict[str, float]:
+    return {name: _number(value) for name, value in values.items()}
+
+
+def _numbers(values: Any, shape: tuple[int, ...]) -> Array:
+    array = np.array(values, dtype=np.float64)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise ValueError(f"expected {' x '.join(map(str, shape))} numbers")
+    return array
+
+
+def _covariance(values: Any) -> Array:
+    covariance = _numbers(values, (STATE_COUNT, STATE_COUNT))
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    held = np.where(sigma > 0.0, sigma, 1.0)
+    correlation = covariance / np.outer(held, held)
+    is_symmetric = np.allclose(correlation, correlation.T, rtol=0.0, atol=1e-6)
+    if not is_symmetric or np.linalg.eigvalsh(correlation).min() < _LEAST_EIGENVALUE:
+        raise ValueError("covariance: expected a symmetric matrix without negative eigenvalues")
+    return covariance
