@@ -1,19 +1,37 @@
 """`acu-daemon replay`: recorded readings through the daemon's own fit and prediction."""
 
 import sys
+import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from acu_daemon.assist.estimator import ESTIMATORS
-from acu_daemon.cli.options import Config, Satellite, load_target
+from acu_daemon.cli.options import Config, Satellite, Target, load_target
 from acu_daemon.config import estimator_settings
+from acu_daemon.control.comparison import compare
 from acu_daemon.control.refit import RefitSetup
 from acu_daemon.control.replay import Replayed, replay
 from acu_daemon.edge.recording import read_readings
 from acu_daemon.errors import UsageError
+from acu_daemon.model import Reading
+
+ALL = "all"
+
+
+@dataclass(frozen=True, slots=True)
+class _Job:
+    """A recording and what it is replayed with; lines: UTC text, reading, TAI."""
+
+    target: Target
+    lines: list[tuple[str, Reading | None, float]]
+
+    @property
+    def timed(self) -> list[tuple[float, Reading | None]]:
+        return [(tai_s, reading) for _, reading, tai_s in self.lines]
 
 
 def command(
@@ -27,41 +45,76 @@ def command(
     ],
     estimator: Annotated[
         str | None,
-        typer.Option("--estimator", metavar="E", help=f"{', '.join(ESTIMATORS)}.  Default: the satellite's TOML."),
+        typer.Option(
+            "--estimator",
+            metavar="E",
+            help=f"{', '.join(ESTIMATORS)}; or {ALL}: a file for each (OUT-kalman.csv and so on), a table of their "
+            "errors, and OUT.png, their errors over time.  Default: the satellite's TOML.",
+        ),
     ] = None,
 ) -> None:
     """Predict every recorded instant from the locked readings before it, as the daemon would have.
 
-    Readings: any rate from 0.2 Hz up; `locked` is the raw flag, 0 or 1; angles may be empty where it is 0.
+    Readings: any rate from 0.2 Hz up; `locked` is the raw flag, 0 or 1; angles may be empty where it is 0.  With
+    --estimator all, readings without lock that have angles are what the predictions are compared with.
     """
-    if out.exists() and readings.exists() and out.samefile(readings):
-        raise UsageError(f"--out {out} is the recording itself; give the predictions a file of their own")
+    names: list[str | None] = [*ESTIMATORS] if estimator == ALL else [estimator]
+    paths = {name: _beside(out, name) if estimator == ALL else out for name in names}
+    for path in paths.values():
+        if path.exists() and readings.exists() and path.samefile(readings):
+            raise UsageError(f"--out {path} is the recording itself; give the predictions a file of their own")
     lines = read_readings(readings)
     if not lines:
         raise UsageError(f"{readings}: no readings below the header")
-    target = load_target(config, satellite, lines[0][2])
-    name = estimator or target.station.tracking.estimator
-    for warning in target.elements.warnings:
+    job = _Job(load_target(config, satellite, lines[0][2]), lines)
+    for warning in job.target.elements.warnings:
         typer.echo(f"warning: {warning}", err=True)
+    results: dict[str, list[Replayed]] = {}
+    seconds: dict[str, float] = {}
+    for asked, path in paths.items():
+        name = asked or job.target.station.tracking.estimator
+        started_s = time.perf_counter()
+        results[name] = _replay_to(job, name, path)
+        seconds[name] = time.perf_counter() - started_s
+    if estimator == ALL:
+        _compare(job, results, seconds, out.with_suffix(".png"))
+
+
+def _beside(out: Path, name: str | None) -> Path:
+    return out.with_name(f"{out.stem}-{name}{out.suffix}")
+
+
+def _replay_to(job: _Job, name: str, out: Path) -> list[Replayed]:
+    station = job.target.station
     setup = RefitSetup(
-        target.elements.propagator,
-        target.station.site,
+        job.target.elements.propagator,
+        station.site,
         name,
-        estimator_settings(target.station, target.satellite),
-        target.station.acu.azimuth.limits(),
+        estimator_settings(station, job.target.satellite),
+        station.acu.azimuth.limits(),
     )
-    on_progress = _progress(len(lines)) if sys.stderr.isatty() else None
-    results = replay(
-        setup, [(tai_s, one) for _, one, tai_s in lines], target.station.receiver.lock_dwell_s, on_progress
-    )
+    on_progress = _progress(name, len(job.lines)) if sys.stderr.isatty() else None
+    results = list(replay(setup, job.timed, station.receiver.lock_dwell_s, on_progress))
     rows = ["utc,az_deg,el_deg,sigma_deg,source"]
-    rows += [_row(utc, result) for (utc, _, _), result in zip(lines, results, strict=True)]
+    rows += [_row(utc, result) for (utc, _, _), result in zip(job.lines, results, strict=True)]
     try:
         out.write_text("\n".join(rows) + "\n", encoding="ascii")
     except OSError as error:
         raise UsageError(f"--out {out}: {error.strerror}") from None
     if on_progress is not None:
-        typer.echo(f"\r\033[K{len(lines)} lines written to {out}", err=True)
+        typer.echo(f"\r\033[K{len(job.lines)} lines written to {out}", err=True)
+    return results
+
+
+def _compare(job: _Job, results: dict[str, list[Replayed]], seconds: dict[str, float], picture: Path) -> None:
+    from acu_daemon.report.comparison import plot, table  # matplotlib is slow to load; one estimator needs none
+
+    seen = compare(job.timed, results, job.target.station.receiver.lock_dwell_s)
+    typer.echo("\n".join(table(seen, seconds)))
+    try:
+        plot(picture, seen, f"{job.target.elements.label} over {job.target.station.station.name}")
+    except OSError as error:
+        raise UsageError(f"{picture}: {error.strerror}") from None
 
 
 def _row(utc: str, result: Replayed) -> str:
@@ -70,8 +123,8 @@ def _row(utc: str, result: Replayed) -> str:
     return f"{utc},{'0.00000' if az == '360.00000' else az},{result.el_deg:.5f},{sigma},{result.source}"
 
 
-def _progress(total: int) -> Callable[[int], None]:
+def _progress(name: str, total: int) -> Callable[[int], None]:
     def show(count: int) -> None:
-        typer.echo(f"\r\033[Kreplay {count / total:4.0%}", err=True, nl=False)
+        typer.echo(f"\r\033[Kreplay {name} {count / total:4.0%}", err=True, nl=False)
 
     return show

@@ -3,15 +3,24 @@
 The same object runs in the child process, inline in virtual time, and in a replay.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from acu_daemon.assist.carry_over import CarryOver, aged_prior, first_fit
 from acu_daemon.assist.estimator import Estimator, EstimatorSettings, has_covariance, make_estimator
+from acu_daemon.assist.full import FullEstimator
+from acu_daemon.assist.gate import OUTLIER
+from acu_daemon.assist.model_choice import Model, ModelChoice, choose, newest_residual_deg
 from acu_daemon.assist.prediction import predict
+from acu_daemon.assist.track_gate import TrackGate
 from acu_daemon.model import AxisLimits, FitResult, Prediction, PredictionKind, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.pointing.keyhole import follow_path, longest_window_s
+
+BATCH_S = 1.0  # readings are judged by the fit to those before them: so many at a time
+BATCH_SHARE = 0.1  # or this share of what was taken already, such as when a new child is given a whole pass
+RESTART_S = 30.0  # a fit that is bad again and again starts afresh with the newest readings
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,45 +51,121 @@ class RefitRequest:
 
 
 @dataclass(frozen=True, slots=True)
+class GateVerdict:
+    """Why the newest readings are left out ("" when they are kept), and how many were so far, by reason."""
+
+    rejecting: str = ""
+    counts: dict[str, int] = field(default_factory=dict)
+    reset_count: int = 0  # how often what was believed gave way to newer readings
+
+
+@dataclass(frozen=True, slots=True)
 class RefitReply:
-    """The newest fit, None before the first one is possible, the buffer made from it, and what people should know."""
+    """The newest fit, the buffer, and what people should know.  The fit is None while another model is in use."""
 
     fit: FitResult | None
     prediction: Prediction
     notes: tuple[str, ...] = ()
+    model: Model = Model.ELEMENTS
+    gate: GateVerdict = GateVerdict()
 
 
 class Refitter:
-    """An estimator and the orbit it corrects.  Owned by one task."""
+    """An estimator, the gate before it, and the orbit they correct.  Owned by one task."""
 
     def __init__(self, setup: RefitSetup) -> None:
         self._setup = setup
-        self._estimator: Estimator = make_estimator(
-            setup.estimator, setup.propagator, setup.site, setup.settings, setup.carried
-        )
+        self._carried = setup.carried if has_covariance(setup.estimator) else None
+        self._gate = TrackGate(setup.propagator, setup.site, setup.settings)
+        self._choice = ModelChoice()
+        self._begin_fit()
 
     def refit(self, request: RefitRequest) -> RefitReply:
-        """Take new readings, fit, and predict from the corrected orbit.
-
-        Before the first fit the orbit is what an earlier pass left, else the elements' own.
+        """Take new readings, fit, and predict from the model that the newest readings prefer.
 
         Raises: OrbitError: the propagator has no answer for the span.
         """
-        if len(request.readings):
-            self._estimator.add(request.readings)
-        fit = self._estimator.fit()
-        setup = self._setup
-        notes, self._estimator.notes[:] = tuple(self._estimator.notes), ()
-        shown = self._before_fit(request.now_tai_s) if fit is None else fit
-        prediction = predict_from(setup, shown, request, kind="TLE" if fit is None else "FITTED")
-        return RefitReply(fit, prediction, notes)
+        for batch in self._batches(request.readings):
+            self._take(batch)
+        notes = self._take_notes()
+        models = self._models(request.now_tai_s)
+        self._choose(models, has_news=len(request.readings) > 0)
+        if self._choice.is_reset_due:
+            self._gate.restart(RESTART_S)
+            self._begin_fit()
+            models = self._models(request.now_tai_s)
+            self._choose(models, has_news=True)
+        return self._reply(request, models, notes)
 
-    def _before_fit(self, now_tai_s: float) -> FitResult | None:
+    def _batches(self, readings: Readings) -> Iterator[Readings]:
+        while len(readings):
+            kept = self._gate.kept
+            taken_s = float(kept.tai_s[-1] - kept.tai_s[0]) if len(kept) else 0.0
+            is_now = readings.tai_s < readings.tai_s[0] + max(BATCH_S, BATCH_SHARE * taken_s)
+            yield readings.part(is_now)
+            readings = readings.part(~is_now)
+
+    def _take(self, batch: Readings) -> None:
+        taken = self._gate.take(batch, self._judge.fit())
+        if taken.is_rebuilt:
+            self._begin_fit()
+        elif len(taken.new):
+            for estimator in self._estimators:
+                estimator.add(taken.new)
+
+    def _begin_fit(self) -> None:
+        """Make the estimator afresh, and one for the gate, which needs a sigma, and give them the kept readings."""
         setup = self._setup
-        if setup.carried is None or not has_covariance(setup.estimator):
-            return None
-        prior = aged_prior(setup.carried, setup.propagator, setup.site, setup.settings, now_tai_s)
-        return first_fit(setup.carried, prior)
+        what = (setup.propagator, setup.site, setup.settings)
+        self._estimator: Estimator = make_estimator(setup.estimator, *what, self._carried)
+        self._judge: Estimator = self._estimator if has_covariance(setup.estimator) else FullEstimator(*what)
+        self._estimators = [self._estimator] if self._judge is self._estimator else [self._estimator, self._judge]
+        if len(self._gate.kept):
+            for estimator in self._estimators:
+                estimator.add(self._gate.kept)
+
+    def _take_notes(self) -> tuple[str, ...]:
+        notes, self._estimator.notes[:] = tuple(self._estimator.notes), ()
+        if notes:  # the readings denied what was carried over
+            self._carried = None
+        return notes
+
+    def _models(self, now_tai_s: float) -> dict[Model, FitResult | None]:
+        """The models there are, each with what it adds to the elements."""
+        setup, models = self._setup, dict[Model, FitResult | None]({Model.ELEMENTS: None})
+        if self._carried is not None:
+            prior = aged_prior(self._carried, setup.propagator, setup.site, setup.settings, now_tai_s)
+            models[Model.LAST_PASS] = first_fit(self._carried, prior)
+        fit = self._estimator.fit()
+        if fit is not None:
+            models[Model.NEW_FIT] = fit
+        return models
+
+    def _choose(self, models: dict[Model, FitResult | None], *, has_news: bool) -> None:
+        kept, setup = self._gate.kept, self._setup
+        if len(kept) == 0:
+            self._choice = ModelChoice(Model.LAST_PASS if Model.LAST_PASS in models else Model.ELEMENTS)
+        elif has_news:
+            residuals_deg = {
+                model: newest_residual_deg(setup.propagator, setup.site, fit, kept, setup.settings)
+                for model, fit in models.items()
+            }
+            noise_deg = max(setup.settings.sigma_azimuth_deg, setup.settings.sigma_elevation_deg)
+            self._choice = choose(self._choice, residuals_deg, noise_deg)
+
+    def _reply(
+        self, request: RefitRequest, models: dict[Model, FitResult | None], notes: tuple[str, ...]
+    ) -> RefitReply:
+        model, fit = self._choice.model, models.get(Model.NEW_FIT)
+        counts = self._gate.counts
+        if fit is not None:
+            if fit.rejected_count:
+                counts[OUTLIER] = counts.get(OUTLIER, 0) + fit.rejected_count
+            fit = replace(fit, rejected_count=sum(counts.values()))
+        kind: PredictionKind = "FITTED" if model is Model.NEW_FIT else "TLE"
+        prediction = predict_from(self._setup, models.get(model), request, kind)
+        verdict = GateVerdict(self._gate.rejecting if len(request.readings) else "", counts, self._gate.reset_count)
+        return RefitReply(fit if model is Model.NEW_FIT else None, prediction, notes, model, verdict)
 
 
 def predict_from(setup: RefitSetup, fit: FitResult | None, request: RefitRequest, kind: PredictionKind) -> Prediction:

@@ -7,7 +7,7 @@ from typing import Any
 
 import structlog
 
-from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup, predict_from
+from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup, before_fit, predict_from
 from acu_daemon.control.state import PassPlan
 from acu_daemon.control.states import AUTOTRACKING, HOLDING, TrackState
 from acu_daemon.daemon.area import CommonArea
@@ -99,7 +99,8 @@ class Background:
         if sky.prediction is not None and sky.prediction.end_tai_s - request.now_tai_s > self._low_water_s:
             return
         try:
-            prediction = predict_from(self._setup, sky.fit, request, "TLE" if sky.fit is None else "FITTED")
+            fit = before_fit(self._setup, request.now_tai_s) if sky.fit is None else sky.fit
+            prediction = predict_from(self._setup, fit, request, "TLE" if sky.fit is None else "FITTED")
         except OrbitError as error:
             self._log.warning("prediction.failed", reason=str(error))
             return
