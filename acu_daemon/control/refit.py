@@ -75,7 +75,7 @@ class Refitter:
 
     def __init__(self, setup: RefitSetup) -> None:
         self._setup = setup
-        self._carried = setup.carried if has_covariance(setup.estimator) else None
+        self._carried = setup.carried
         self._gate = TrackGate(setup.propagator, setup.site, setup.settings)
         self._choice = ModelChoice()
         self._begin_fit()
@@ -132,10 +132,9 @@ class Refitter:
 
     def _models(self, now_tai_s: float) -> dict[Model, FitResult | None]:
         """The models there are, each with what it adds to the elements."""
-        setup, models = self._setup, dict[Model, FitResult | None]({Model.ELEMENTS: None})
+        models: dict[Model, FitResult | None] = {Model.ELEMENTS: None}
         if self._carried is not None:
-            prior = aged_prior(self._carried, setup.propagator, setup.site, setup.settings, now_tai_s)
-            models[Model.LAST_PASS] = first_fit(self._carried, prior)
+            models[Model.LAST_PASS] = before_fit(self._setup, now_tai_s)
         fit = self._estimator.fit()
         if fit is not None:
             models[Model.NEW_FIT] = fit
@@ -166,6 +165,21 @@ class Refitter:
         prediction = predict_from(self._setup, models.get(model), request, kind)
         verdict = GateVerdict(self._gate.rejecting if len(request.readings) else "", counts, self._gate.reset_count)
         return RefitReply(fit if model is Model.NEW_FIT else None, prediction, notes, model, verdict)
+
+
+def before_fit(setup: RefitSetup, now_tai_s: float) -> FitResult | None:
+    """What an earlier pass left, in the shape of a fit; None where there is nothing but the elements."""
+    if setup.carried is None or not has_covariance(setup.estimator):
+        return None
+    prior = aged_prior(setup.carried, setup.propagator, setup.site, setup.settings, now_tai_s)
+    return first_fit(setup.carried, prior)
+
+
+def before_fit(setup: RefitSetup, now_tai_s: float) -> FitResult | None:
+    """What an earlier pass left, aged to now: the prediction is made from it before the first fit.  None: nothing."""
+    if setup.carried is None or not has_covariance(setup.estimator):
+        return None
+    return first_fit(setup.carried, aged_prior(setup.carried, setup.propagator, setup.site, setup.settings, now_tai_s))
 
 
 def predict_from(setup: RefitSetup, fit: FitResult | None, request: RefitRequest, kind: PredictionKind) -> Prediction:
