@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from acu_daemon.assist.estimator import ESTIMATORS
 from acu_daemon.assist.settings import SEED, EstimatorSettings, StateSigmas
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import Array
@@ -38,12 +37,11 @@ _TODAY = replace(
     bias_sigma_elevation_deg=0.1,
     bias_sigma_elevation_cot_deg=0.01,
 )
-FULL = "six" if "six" in ESTIMATORS else "full"
 
 METHODS = {
-    "full": Method(FULL, _TODAY, turned_to_mean),
-    "full-default-bias": Method(FULL, _TODAY_PLAIN, turned_to_mean),
-    "full-as-mean": Method(FULL, _TODAY, taken_as_mean),
+    "full": Method("full", _TODAY, turned_to_mean),
+    "full-default-bias": Method("full", _TODAY_PLAIN, turned_to_mean),
+    "full-as-mean": Method("full", _TODAY, taken_as_mean),
     "deterministic": Method("deterministic", _AS_PUBLISHED, taken_as_mean),
     "kalman": Method("kalman", _AS_PUBLISHED, taken_as_mean),
     "circular": Method("circular", _AS_PUBLISHED, taken_as_mean),

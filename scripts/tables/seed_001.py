@@ -12,7 +12,6 @@ from acu_daemon.orbit.brouwer import BrouwerElements, BrouwerPropagator
 from acu_daemon.orbit.look import look_at
 from acu_daemon.units import DEG, Array
 from tables.landsat import LandsatPass
-from tables.methods import FULL
 
 LIMIT_DEG = 0.1  # seed 001, 2.4.1
 OVERHEAD_DEG = 80.0
@@ -45,7 +44,7 @@ _TODAY_CALIBRATED = replace(
 J2_DISTANCE_KM = 4.4  # by so much the mean distance of this orbit is above its mean semi-major axis
 AS_PUBLISHED = Experiment("circular, sphere of the mean a", "circular", _PUBLISHED, 3.0, 1.0, 0.0, True)
 AS_DAEMON = Experiment("circular, sphere from the source", "circular", _TODAY, 3.0, 1.0, 0.0, False)
-FULL_10_S = Experiment("full", FULL, _TODAY, 10.0, 10.0, _NOISE_DEG, False)
+FULL_10_S = Experiment("full", "full", _TODAY, 10.0, 10.0, _NOISE_DEG, False)
 
 
 def with_old_elements(experiment: Experiment) -> Experiment:
