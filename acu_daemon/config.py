@@ -120,6 +120,8 @@ class ReadingsSection(Section):
     sigma_elevation_deg: Positive = 0.05
     bias_sigma_azimuth_deg: float = Field(default=0.1, ge=0)
     bias_sigma_elevation_deg: float = Field(default=0.1, ge=0)
+    bias_sigma_azimuth_sec_deg: float = Field(default=0.003, ge=0)  # grows as 1 / cos(el): the axes are not square
+    bias_sigma_elevation_cot_deg: float = Field(default=0.0, ge=0)  # grows as cot(el), towards the horizon
 
 
 class TrackingSection(Section):
@@ -314,6 +316,8 @@ def estimator_settings(station: StationFile, satellite: SatelliteFile) -> Estima
         elevation=station.acu.elevation.limits(),
         bias_sigma_azimuth_deg=station.readings.bias_sigma_azimuth_deg,
         bias_sigma_elevation_deg=station.readings.bias_sigma_elevation_deg,
+        bias_sigma_azimuth_sec_deg=station.readings.bias_sigma_azimuth_sec_deg,
+        bias_sigma_elevation_cot_deg=station.readings.bias_sigma_elevation_cot_deg,
         orbit_sigmas=_orbit_sigmas(satellite.uncertainty),
         station_sigma_m=station.station.uncertainty_m / 2**0.5,  # of east and of north each
     )
