@@ -168,14 +168,6 @@ class Refitter:
 
 
 def before_fit(setup: RefitSetup, now_tai_s: float) -> FitResult | None:
-    """What an earlier pass left, in the shape of a fit; None where there is nothing but the elements."""
-    if setup.carried is None or not has_covariance(setup.estimator):
-        return None
-    prior = aged_prior(setup.carried, setup.propagator, setup.site, setup.settings, now_tai_s)
-    return first_fit(setup.carried, prior)
-
-
-def before_fit(setup: RefitSetup, now_tai_s: float) -> FitResult | None:
     """What an earlier pass left, aged to now: the prediction is made from it before the first fit.  None: nothing."""
     if setup.carried is None or not has_covariance(setup.estimator):
         return None

@@ -8,9 +8,11 @@ from matplotlib.figure import Figure
 
 from acu_daemon.control.comparison import Comparison
 from acu_daemon.model import FitResult
+from acu_daemon.units import Array
 
 FLOOR_DEG = 1e-4  # of the logarithmic scale
-_COLOURS = ("#c8553d", "#e0b13a", "#3d7ea6", "#0b6e4f", "#8c2f39", "#555555")
+_COLOURS = ("#c8553d", "#e0b13a", "#3d7ea6", "#0b6e4f", "#8c2f39", "#555555", "#b7b7d7")  # one for each estimator
+_PARTS = 40
 
 
 def table(seen: Comparison, seconds: dict[str, float]) -> list[str]:
@@ -54,17 +56,23 @@ def plot(path: Path, seen: Comparison, title: str) -> None:
     figure = Figure(figsize=(10.0, 5.0), dpi=120, layout="constrained")
     axes = figure.add_subplot()
     starts = [float(errors.tai_s[0]) for errors in seen.errors.values() if errors.tai_s.size]
-    for k, (name, errors) in enumerate(seen.errors.items()):
+    for colour, (name, errors) in zip(_COLOURS, seen.errors.items(), strict=False):
         if errors.tai_s.size:
-            shown = np.maximum(errors.error_deg, FLOOR_DEG)
-            axes.semilogy(
-                errors.tai_s - min(starts), shown, ".", markersize=3.0, color=_COLOURS[k % len(_COLOURS)], label=name
-            )
+            time_s, error_deg = errors.tai_s - min(starts), np.maximum(errors.error_deg, FLOOR_DEG)
+            axes.semilogy(time_s, error_deg, ".", markersize=2.5, alpha=0.25, color=colour, markeredgewidth=0.0)
+            axes.semilogy(*_medians(time_s, error_deg), linewidth=1.6, color=colour, label=name)
     figure.suptitle(title, fontsize=12, fontweight="bold")
     axes.set_title(what_is_compared(seen), fontsize=9)
     axes.set_xlabel("seconds")
     axes.set_ylabel("prediction against reading, deg on the sky")
     axes.grid(alpha=0.3, which="major")
     if starts:
-        axes.legend(frameon=False, ncols=3, markerscale=3.0)
+        axes.legend(frameon=False, ncols=3, title="medians of short spans")
     figure.savefig(path, format="png")
+
+
+def _medians(time_s: Array, error_deg: Array) -> tuple[list[float], list[float]]:
+    """Medians of some forty equal parts, at their medium times."""
+    count = min(_PARTS, time_s.size)
+    times, errors = ([float(np.median(part)) for part in np.array_split(one, count)] for one in (time_s, error_deg))
+    return times, errors
