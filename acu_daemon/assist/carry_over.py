@@ -102,11 +102,13 @@ def aged_prior(
     """What the carry-over tells of the states at at_tai_s, in place of `make_prior`.
 
     The mean motion is first held to what elements are worth over days: within one pass its error looks like others',
-    and what a pass's noise leaves in it runs away until the next.  Then come drag, as a constant error of the mean
-    motion's rate from the fit on, and slow drifts.
+    and what a pass's noise leaves in it runs away until the next.  What is left of the correction counts as far as it
+    stands out from its own uncertainty.  Then come drag, as a constant error of the mean motion's rate from the fit on,
+    and slow drifts.
     """
     fresh = make_prior(source, settings, at_tai_s)
     mean, covariance = _held_to_long_mean_motion(_mean(carried), carried, settings)
+    mean[ORBIT] *= _significance(mean[ORBIT], covariance[ORBIT, ORBIT])
     covariance = covariance + _process_noise(carried, settings, np.diag(fresh.covariance), at_tai_s)
     if carried.station != site.station:
         mean, covariance = _orbit_alone(mean, covariance, fresh)
@@ -174,6 +176,22 @@ def _held_to_long_mean_motion(mean: Array, carried: CarryOver, settings: Estimat
     sigma_rad_s = hypot(share_rad_s, float(along_rad) / max(abs(since_s), _LEAST_AGE_S))
     gain = covariance[:, _MEAN_MOTION] / (covariance[_MEAN_MOTION, _MEAN_MOTION] + sigma_rad_s**2)
     return mean - gain * mean[_MEAN_MOTION], covariance - np.outer(gain, covariance[_MEAN_MOTION])
+
+
+def _significance(correction: Array, covariance: Array) -> float:
+    """The factor, 0 to 1, by which a correction shrinks: elements that one pass cannot better are left as they are.
+
+    Source:  James and Stein, Estimation with quadratic loss, 4th Berkeley Symposium (1961), positive part.
+    """
+    sigma = np.sqrt(np.diag(covariance) + _WOBBLE_RAD**2 * (np.arange(correction.size) == _MEAN_ANOMALY))
+    is_state = sigma > 0.0
+    if np.count_nonzero(is_state) <= 2:
+        return 1.0
+    off = correction[is_state] / sigma[is_state]
+    correlation = covariance[np.ix_(is_state, is_state)] / np.outer(sigma[is_state], sigma[is_state])
+    np.fill_diagonal(correlation, 1.0)
+    distance2 = float(off @ np.linalg.solve(correlation, off))
+    return max(0.0, 1.0 - (off.size - 2) / distance2) if distance2 > 0.0 else 0.0
 
 
 def _process_noise(carried: CarryOver, settings: EstimatorSettings, fresh_variance: Array, at_tai_s: float) -> Array:
