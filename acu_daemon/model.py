@@ -4,11 +4,13 @@ Time is TAI seconds since 2000-01-01T12:00:00 TAI, one float (0.1 us today), mon
 Angles are degrees.  Azimuth is clockwise from true north.  "Encoder frame" means as the ACU counts it.
 """
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from math import cos, radians
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from acu_daemon.units import Array
 
@@ -58,6 +60,7 @@ class Reading:
     az_deg: float
     el_deg: float
     is_locked: bool  # the raw acquisition flag; the dwell is applied by whoever fits
+    agc_db: float | None = None  # None: unknown, such as in a recording
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,9 +70,35 @@ class Readings:
     tai_s: Array
     az_deg: Array
     el_deg: Array
+    agc_db: Array | None = None  # NaN where one is unknown; None: all are
 
     def __len__(self) -> int:
         return int(self.tai_s.size)
+
+    def part(self, which: slice | npt.NDArray[np.bool_] | npt.NDArray[np.int64]) -> "Readings":
+        """The readings that an index of arrays picks."""
+        agc_db = None if self.agc_db is None else self.agc_db[which]
+        return Readings(self.tai_s[which], self.az_deg[which], self.el_deg[which], agc_db)
+
+    @staticmethod
+    def of(readings: Iterable[Reading]) -> "Readings":
+        """Single readings as arrays."""
+        rows = [(r.tai_s, r.az_deg, r.el_deg, np.nan if r.agc_db is None else r.agc_db) for r in readings]
+        tai_s, az_deg, el_deg, agc_db = np.array(rows, dtype=np.float64).reshape(-1, 4).T
+        return Readings(tai_s, az_deg, el_deg, None if bool(np.all(np.isnan(agc_db))) else agc_db)
+
+    @staticmethod
+    def joined(parts: Sequence["Readings"]) -> "Readings":
+        """One after the other."""
+        if len(parts) == 1:
+            return parts[0]
+        tai_s, az_deg, el_deg = (
+            np.concatenate([getattr(one, name) for one in parts]) for name in ("tai_s", "az_deg", "el_deg")
+        )
+        agc_db = [np.full(len(one), np.nan) if one.agc_db is None else one.agc_db for one in parts]
+        return Readings(
+            tai_s, az_deg, el_deg, None if all(one.agc_db is None for one in parts) else np.concatenate(agc_db)
+        )
 
 
 @dataclass(frozen=True, slots=True)

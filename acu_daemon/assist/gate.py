@@ -1,4 +1,7 @@
-"""Which readings are fit to be used: the dwell after acquisition, and plain reasons to leave a reading out.  Pure."""
+"""Which readings are fit to be used: the dwell after acquisition, and plain reasons to leave a reading out.  Pure.
+
+What only an orbit can tell is in assist.track_gate.
+"""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -9,9 +12,15 @@ import numpy as np
 from acu_daemon.model import AxisLimits, Reading, Readings
 from acu_daemon.units import wrap_180
 
+DWELL = "not acquired for the dwell time yet"
 ABOVE_MAX_ELEVATION = "above the highest elevation for fits"
 TOO_FAST = "faster than the axis can move"
 OUTLIER = "far from the prediction of the fit"
+ACCELERATION = "the axis accelerates near its limit"
+SIDE_LOBE = "side lobe"
+WRONG_TARGET = "wrong target: it moves unlike the satellite"
+OFF_PATH = "off the predicted path"
+BELIED = "belied by newer readings"
 
 _RATE_MARGIN = 1.1  # an encoder's time tag jitters
 _SIGMA_COUNT = 6.0
@@ -36,6 +45,7 @@ class Dwell:
         self._max_gap_s = max_gap_s
         self._since_tai_s: float | None = None
         self._last_tai_s: float | None = None
+        self.rejected_count = 0  # acquired, but not for long enough
 
     def is_locked(self, reading: Reading) -> bool:
         """Take the next reading, oldest first, and say whether it counts as locked."""
@@ -46,14 +56,14 @@ class Dwell:
             self._since_tai_s = reading.tai_s
         self._last_tai_s = reading.tai_s
         since = reading.tai_s if self._since_tai_s is None else self._since_tai_s
-        return reading.tai_s - since >= self._dwell_s - 1e-6
+        is_long_enough = reading.tai_s - since >= self._dwell_s - 1e-6
+        self.rejected_count += not is_long_enough
+        return is_long_enough
 
 
 def locked_readings(readings: Iterable[Reading], dwell: Dwell) -> Readings:
     """Keep the locked ones, oldest first, in the form that estimators take."""
-    rows = [(r.tai_s, r.az_deg, r.el_deg) for r in readings if dwell.is_locked(r)]
-    tai_s, az_deg, el_deg = np.array(rows, dtype=np.float64).reshape(-1, 3).T
-    return Readings(tai_s, az_deg, el_deg)
+    return Readings.of([reading for reading in readings if dwell.is_locked(reading)])
 
 
 class ReadingGate:
@@ -89,7 +99,7 @@ class ReadingGate:
                 rejected.append(Rejected(row[0], ABOVE_MAX_ELEVATION))
             else:
                 keep.append(k)
-        return Readings(readings.tai_s[keep], readings.az_deg[keep], readings.el_deg[keep]), rejected
+        return readings.part(np.array(keep, dtype=np.int64)), rejected
 
     def _is_too_fast(self, tai_s: float, az_deg: float, el_deg: float) -> bool:
         if self._last is None or self._azimuth is None or self._elevation is None:

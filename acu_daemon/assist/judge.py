@@ -1,0 +1,73 @@
+"""Whether readings can be the satellite's: the orbit that fits them must be one that the elements allow.  Pure.
+
+Another satellite moves at other rates, so no small change of our elements goes through its readings for long; elements
+that are wrong along the track by degrees are still ours.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from acu_daemon.assist.full import FullEstimator
+from acu_daemon.assist.full_states import BROUWER_SIGMAS
+from acu_daemon.assist.offsets import Offsets, offsets
+from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings, StateSigmas
+from acu_daemon.errors import OrbitError
+from acu_daemon.model import Readings, Site
+from acu_daemon.orbit.propagator import Propagator
+
+NEAR_SHARE = 0.9  # of the readings must lie near the orbit that fits them
+PAST_S = 30.0  # so much of the readings believed before must stay near
+SURE_ALONG = 3.0  # the mean anomaly is never given more room than this
+
+
+def widened(source: Propagator, settings: EstimatorSettings, factor: float) -> EstimatorSettings:
+    """The settings with an orbit that is worth less: all its sigmas are factor times as large."""
+    sigmas = settings.orbit_sigmas or (BROUWER_SIGMAS if source.kind == "brouwer" else ElementSigmas())
+    if isinstance(sigmas, StateSigmas):
+        wide: ElementSigmas | StateSigmas = StateSigmas(factor * sigmas.position_m, factor * sigmas.velocity_m_s)
+    else:
+        wide = ElementSigmas(
+            raan_deg=factor * sigmas.raan_deg,
+            mean_anomaly_deg=min(factor, SURE_ALONG) * sigmas.mean_anomaly_deg,
+            mean_motion_rad_min=factor * sigmas.mean_motion_rad_min,
+            mean_motion_per_day_rad_min=factor * sigmas.mean_motion_per_day_rad_min,
+            e_vector=factor * sigmas.e_vector,
+            inclination_deg=factor * sigmas.inclination_deg,
+        )
+    return replace(settings, orbit_sigmas=wide, azimuth=None, elevation=None)
+
+
+class Judge:
+    """Fits questioned readings, together with those believed before, to an orbit near the elements."""
+
+    def __init__(self, source: Propagator, site: Site, settings: EstimatorSettings) -> None:
+        self._source, self._site, self._settings = source, site, settings
+
+    def verdict(self, before: Readings | None, questioned: Readings, factor: float) -> Offsets | None:
+        """Offsets of the questioned readings from the orbit that fits, or None: no orbit near the elements does."""
+        settings = widened(self._source, self._settings, factor)
+        estimator = FullEstimator(self._source, self._site, settings)
+        together = questioned if before is None else Readings.joined([before, questioned])
+        try:
+            estimator.add(together)
+            fit = estimator.fit()
+            if fit is None:
+                return None
+            # the fit's own sigma would excuse what it cannot explain
+            fit = replace(fit, covariance=None)
+            seen = offsets(self._source, self._site, fit, together, settings)
+        except (OrbitError, np.linalg.LinAlgError):
+            return None
+        count = len(questioned)
+        is_near = seen.angle_deg <= seen.near_deg
+        if np.mean(is_near[-count:]) < NEAR_SHARE:
+            return None
+        old = slice(None, -count)
+        if before is not None and np.mean(is_near[old][seen.tai_s[old] >= before.tai_s[-1] - PAST_S]) < NEAR_SHARE:
+            return None
+        return _newest(seen, count)
+
+
+def _newest(seen: Offsets, count: int) -> Offsets:
+    return Offsets(*(getattr(seen, name)[-count:] for name in Offsets.__slots__))
