@@ -19,21 +19,36 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 from real_pass import pass_names, truth_path, truth_span, write_config
+from skyfield.api import EarthSatellite, load, wgs84
 
+from acu_daemon.assist.estimator import EstimatorSettings, make_estimator
 from acu_daemon.assist.inversion import KnownElements, direction_cosines, invert
 from acu_daemon.assist.prediction import predict
+from acu_daemon.cli import demo
 from acu_daemon.cli.options import Target, load_target
 from acu_daemon.cli.virtual_pass import Flight, fly
-from acu_daemon.model import AxisLimits, EarthOrientation, Site, Station, sky_angle_deg
+from acu_daemon.model import (
+    AxisLimits,
+    Correction,
+    EarthOrientation,
+    FitResult,
+    Readings,
+    Site,
+    Station,
+    sky_angle_deg,
+)
 from acu_daemon.orbit.brouwer import BrouwerElements, BrouwerPropagator
 from acu_daemon.orbit.frames import station_itrs_m
 from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.passes import find_passes
+from acu_daemon.orbit.sgp4_source import Sgp4Propagator
 from acu_daemon.orbit.timescales import gmst_rad, tai_from_utc
+from acu_daemon.orbit.tle import parse_tle
 from acu_daemon.pointing.keyhole import follow_path
 from acu_daemon.protocol.messages import AcuMode, Backup, Poll, SelectBackup, SelectMode, WriteAndPoll, WriteParameter
 from acu_daemon.sim.acu import FakeAcu
@@ -270,13 +285,63 @@ def costs() -> dict[str, float]:
     def buffer() -> None:
         predict(source, site, rise, rise, "TLE", 0.0, horizon_s=89.9, step_s=0.1)
 
-    return {"inversion": median_us(inversion), "pair alone": median_us(pair), "pair of 900": median_us(buffer) / 900}
+    return {
+        "inversion": median_us(inversion),
+        "pair alone": median_us(pair),
+        "pair of 900": median_us(buffer) / 900,
+    } | full_costs()
 
 
-def median_us(work: Callable[[], None]) -> float:
-    """Median of 200 runs, microseconds."""
+def full_costs() -> dict[str, float]:
+    """`full` on a real element set: a refit of 9000 readings, 900 pairs with sigma; the same 900 pairs by Skyfield."""
+    tle = (Path(demo.__file__).parent / "demo_config" / "satellites" / "demo-1.tle").read_text()
+    source = Sgp4Propagator(parse_tle(tle, "demo-1.tle")[0][0])
+    site = Site(Station("Cuiaba", -15.53, -56.07, 277.0))
+    start = tai_from_utc("2026-08-18T12:39:30Z")
+    tai_s = start + 0.07 * np.arange(9000)
+    seen = look_at(source.corrected(Correction(delta_mean_anomaly_rad=2e-3)), tai_s, site)
+    noise = NOISE_DEG * np.random.default_rng(1).standard_normal((2, tai_s.size))
+    az_deg = (seen.az_deg + noise[0] / np.cos(np.radians(seen.el_deg))) % 360.0
+    readings = Readings(tai_s, az_deg, seen.el_deg + noise[1])
+    settings = EstimatorSettings(azimuth=AZIMUTH, elevation=ELEVATION)
+
+    def refit() -> FitResult | None:
+        estimator = make_estimator("full", source, site, settings)
+        estimator.add(readings)
+        return estimator.fit()
+
+    fit = refit()
+    if fit is None:
+        raise ValueError("no fit from a whole pass of readings")
+    corrected = source.corrected(fit.correction)
+
+    def pairs() -> None:
+        predict(corrected, site, start + 300.0, start, "FITTED", 0.0, horizon_s=89.9, step_s=0.1, fit=fit)
+
+    scale = load.timescale(builtin=True)
+    times = scale.from_datetimes(
+        [datetime(2026, 8, 18, 12, 44, 30, tzinfo=UTC) + timedelta(seconds=0.1 * k) for k in range(900)]
+    )
+    name, one, two = tle.splitlines()
+    satellite, ground = EarthSatellite(one, two, name, scale), wgs84.latlon(-15.53, -56.07, 277.0)
+
+    def by_skyfield() -> None:
+        fresh = scale.tt_jd(times.tt)  # without what Skyfield remembers of earlier runs
+        (satellite - ground).at(fresh).altaz()
+
+    ours, theirs = median_us(pairs, 50), median_us(by_skyfield, 20)
+    return {
+        "full, refit of 9000": median_us(refit, 20),
+        "full, 900 pairs": ours,
+        "Skyfield, 900 pairs": theirs,
+        "ratio": ours / theirs,
+    }
+
+
+def median_us(work: Callable[[], object], count: int = 200) -> float:
+    """Median of many runs, microseconds."""
     times = []
-    for _ in range(200):
+    for _ in range(count):
         started = time.perf_counter()
         work()
         times.append(time.perf_counter() - started)
