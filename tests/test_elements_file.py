@@ -144,12 +144,6 @@ def test_a_file_that_is_not_there_or_a_directory_is_told_with_the_key(tmp_path: 
     assert refusal(tmp_path, from_file("ISS", "tle", "..")).endswith("DIR/satellites/..: Is a directory")
 
 
-def test_an_ephemeris_is_refused_with_what_can_be_read(tmp_path: Path) -> None:
-    assert refusal(tmp_path, from_file("ISS", "oem", "x.oem")) == (
-        'DIR/satellites/sat.toml: elements.kind = "oem" is not read yet; use "tle" or "omm"'
-    )
-
-
 def test_an_orbit_mean_elements_message_is_read(tmp_path: Path) -> None:
     fields = {
         "OBJECT_NAME": "ISS (ZARYA)",

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from acu_daemon.cli.options import Config, Target, load_target
+from acu_daemon.cli.options import Config, Target, ending, load_target, not_covered
 from acu_daemon.config import load_station, satellite_names
 from acu_daemon.control.plan import plan_pass
 from acu_daemon.edge.clock import SystemClock, is_clock_synchronised
@@ -126,9 +126,15 @@ def _next_pass(name: str, target: Target, now_tai_s: float) -> Iterator[Finding]
     lowest_deg = station.station.min_elevation_deg
     passes = find_passes(target.elements.propagator, station.site, now_tai_s, now_tai_s + DAY_S, lowest_deg)
     if not passes:
-        yield Finding(WARN, f"{name}: next pass", f"none above {lowest_deg:g} deg within a day")
+        until = ending(target, now_tai_s + DAY_S)
+        yield Finding(
+            WARN, f"{name}: next pass", f"none above {lowest_deg:g} deg within a day" + (until and f"; {until}")
+        )
         return
     coming = passes[0]
+    if lacking := not_covered(target, coming, now_tai_s):
+        yield Finding(NO_GO, f"{name}: next pass", lacking)
+        return
     yield Finding(
         GO,
         f"{name}: next pass",

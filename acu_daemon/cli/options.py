@@ -14,10 +14,13 @@ from acu_daemon.edge.elements_file import LoadedElements, load_elements
 from acu_daemon.errors import ElementsError, UsageError
 from acu_daemon.model import Pass
 from acu_daemon.orbit.passes import find_passes
+from acu_daemon.orbit.propagator import spans_tai_s
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
+from acu_daemon.pointing.keyhole import longest_window_s
 from acu_daemon.units import DAY_S
 
 NEXT_PASS_DAYS = 3.0
+SPARE_S = 30.0  # what a buffer and a fit look at beyond the times they are for, with some to spare
 
 Config = Annotated[
     Path,
@@ -77,14 +80,17 @@ def load_target(config: Path, name: str, now_tai_s: float, *, is_strict: bool = 
     """Read both files and the elements.  With is_strict, elements that must not be used raise ElementsError."""
     base = load_station(config)
     satellite, station = load_satellite(config, name, base)
-    elements = load_elements(satellite, config / "satellites" / f"{name}.toml", now_tai_s)
+    elements = load_elements(satellite, config / "satellites" / f"{name}.toml", now_tai_s, station.site.orientation)
     if is_strict and elements.errors:
         raise ElementsError("\n".join(elements.errors))
     return Target(station, satellite, elements)
 
 
 def coming_pass(target: Target, now_tai_s: float) -> Pass:
-    """The pass in progress, else the next one.  UsageError: none within three days."""
+    """The pass in progress, else the next one.
+
+    UsageError: none within three days, or one that the elements do not cover from its preparation to its last buffer.
+    """
     passes = find_passes(
         target.elements.propagator,
         target.station.site,
@@ -94,8 +100,34 @@ def coming_pass(target: Target, now_tai_s: float) -> Pass:
     )
     for coming in passes:
         if coming.set_tai_s > now_tai_s:
+            if lacking := not_covered(target, coming, now_tai_s):
+                raise UsageError(lacking)
             return coming
+    until = ending(target, now_tai_s + NEXT_PASS_DAYS * DAY_S)
     raise UsageError(
         f"no pass of {target.elements.label} over {target.station.station.name} above "
         f"{target.station.station.min_elevation_deg:g} deg within {NEXT_PASS_DAYS:g} days of {utc_text(now_tai_s, 0)}"
+        + (until and f"; {until}")
+    )
+
+
+def ending(target: Target, end_tai_s: float) -> str:
+    """Say that no pass is known up to the end of a search, empty where the elements reach that far."""
+    last_tai_s = spans_tai_s(target.elements.propagator)[-1][1]
+    return "" if last_tai_s >= end_tai_s else f"the ephemeris ends at {utc_text(last_tai_s, 0)}"
+
+
+def not_covered(target: Target, coming: Pass, now_tai_s: float) -> str:
+    """Say what an ephemeris lacks for a pass; empty for other elements and where it lacks nothing."""
+    tracking = target.station.tracking
+    from_tai_s = max(coming.rise_tai_s - tracking.preposition_s, now_tai_s)
+    from_tai_s -= longest_window_s(target.station.acu.azimuth.limits()) + SPARE_S
+    to_tai_s = coming.set_tai_s + tracking.horizon_s + SPARE_S
+    spans = spans_tai_s(target.elements.propagator)
+    if any(start <= from_tai_s and to_tai_s <= end for start, end in spans):
+        return ""
+    covered = " and ".join(f"{utc_text(start, 0)} to {utc_text(end, 0)}" for start, end in spans)
+    return (
+        f"the pass of {target.elements.label} at {utc_text(coming.rise_tai_s, 0)} needs an ephemeris from "
+        f"{utc_text(from_tai_s, 0)} to {utc_text(to_tai_s, 0)}; this one covers {covered}: fetch a longer one"
     )

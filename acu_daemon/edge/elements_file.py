@@ -5,8 +5,18 @@ from pathlib import Path
 
 from acu_daemon.config import BrouwerSection, ElementsFileSection, SatelliteFile
 from acu_daemon.errors import ElementsError
+from acu_daemon.model import EarthOrientation
 from acu_daemon.orbit.brouwer import BrouwerElements, BrouwerPropagator
-from acu_daemon.orbit.elements import Problem, check_brouwer, check_elements, select_elements
+from acu_daemon.orbit.elements import (
+    Problem,
+    check_brouwer,
+    check_elements,
+    check_ephemeris,
+    select_elements,
+    select_segments,
+)
+from acu_daemon.orbit.ephemeris import Ephemeris, OemPropagator
+from acu_daemon.orbit.oem import parse_oem
 from acu_daemon.orbit.omm import parse_omm
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator
@@ -14,6 +24,7 @@ from acu_daemon.orbit.tle import parse_tle
 from acu_daemon.units import DEG
 
 NAMED_PROBLEMS = 5
+_NO_ORIENTATION = EarthOrientation()
 _PARSERS = {"tle": parse_tle, "omm": parse_omm}
 
 
@@ -28,11 +39,19 @@ class LoadedElements:
     warnings: list[str]
 
 
-def load_elements(satellite: SatelliteFile, toml_path: Path, now_tai_s: float) -> LoadedElements:
-    """Make the satellite's propagator.  Raises: ElementsError: names file, line and reason."""
+def load_elements(
+    satellite: SatelliteFile, toml_path: Path, now_tai_s: float, orientation: EarthOrientation = _NO_ORIENTATION
+) -> LoadedElements:
+    """Make the satellite's propagator.
+
+    orientation: the station's; an Earth-fixed ephemeris needs it.
+    Raises: ElementsError: names file, line and reason.
+    """
     section = satellite.elements
     if isinstance(section, BrouwerSection):
         return _from_brouwer(satellite, section, toml_path, now_tai_s)
+    if section.kind == "oem":
+        return _from_ephemeris(satellite, section, toml_path, now_tai_s, orientation)
     return _from_file(satellite, section, toml_path, now_tai_s)
 
 
@@ -57,13 +76,7 @@ def _from_brouwer(
 def _from_file(
     satellite: SatelliteFile, section: ElementsFileSection, toml_path: Path, now_tai_s: float
 ) -> LoadedElements:
-    if section.kind not in _PARSERS:
-        raise ElementsError(f'{toml_path}: elements.kind = "{section.kind}" is not read yet; use "tle" or "omm"')
-    path = toml_path.parent / section.file
-    try:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError as error:
-        raise ElementsError(f"{toml_path}: elements.file = {section.file!r}: {path}: {error.strerror}") from None
+    path, text = _read(section, toml_path)
     sets, problems = _PARSERS[section.kind](text, str(path))
     if not sets:
         raise ElementsError("\n".join(_few(problems)) or f"{path}: no element set in the file")
@@ -77,8 +90,43 @@ def _from_file(
     return LoadedElements(Sgp4Propagator(chosen), chosen.label, chosen.epoch_tai_s, errors, warnings)
 
 
-def _few(problems: list[Problem]) -> list[str]:
+def _from_ephemeris(
+    satellite: SatelliteFile,
+    section: ElementsFileSection,
+    toml_path: Path,
+    now_tai_s: float,
+    orientation: EarthOrientation,
+) -> LoadedElements:
+    path, text = _read(section, toml_path)
+    segments, problems = parse_oem(text, str(path))
+    if not segments:
+        raise ElementsError("\n".join(_few(problems, "segments")))
+    wanted = satellite.satellite
+    try:
+        segments = select_segments(segments, wanted.norad_id, wanted.name, is_whole=not problems)
+    except ElementsError as error:
+        raise ElementsError("\n".join([str(error), *_few(problems, "segments")])) from None
+    propagator = OemPropagator(Ephemeris(segments, orientation))
+    errors, warnings = check_ephemeris(propagator, section.limits.limits(), now_tai_s)
+    return LoadedElements(
+        propagator,
+        propagator.ephemeris.label,
+        propagator.epoch_tai_s,
+        errors,
+        [*warnings, *_few(problems, "segments")],
+    )
+
+
+def _read(section: ElementsFileSection, toml_path: Path) -> tuple[Path, str]:
+    path = toml_path.parent / section.file
+    try:
+        return path, path.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise ElementsError(f"{toml_path}: elements.file = {section.file!r}: {path}: {error.strerror}") from None
+
+
+def _few(problems: list[Problem], what: str = "element sets") -> list[str]:
     """The first problems as texts, and how many there are beside them."""
     texts = [str(problem) for problem in problems[:NAMED_PROBLEMS]]
     left = len(problems) - len(texts)
-    return [*texts, f"{problems[0].file}: {left} more element sets cannot be read"] if left else texts
+    return [*texts, f"{problems[0].file}: {left} more {what} cannot be read"] if left else texts

@@ -8,11 +8,23 @@ import numpy as np
 from acu_daemon.errors import ElementsError, OrbitError
 from acu_daemon.orbit.brouwer import BrouwerElements
 from acu_daemon.orbit.element_set import ElementSet, Problem
+from acu_daemon.orbit.ephemeris import OemPropagator
+from acu_daemon.orbit.kepler import osculating_from_state
+from acu_daemon.orbit.oem import OemSegment
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.units import DAY_S, DEG, EARTH_EQUATORIAL_RADIUS_M
 
-__all__ = ["ElementLimits", "ElementSet", "Problem", "check_brouwer", "check_elements", "select_elements"]
+__all__ = [
+    "ElementLimits",
+    "ElementSet",
+    "Problem",
+    "check_brouwer",
+    "check_elements",
+    "check_ephemeris",
+    "select_elements",
+    "select_segments",
+]
 
 _DECAYED_PERIGEE_KM = 120.0  # below this an orbit does not last a revolution
 _NAMED_IN_MESSAGES = 5
@@ -54,6 +66,22 @@ def check_brouwer(
     """Check elements written in a TOML file against the limits and their age; errors and warnings as texts."""
     label = f"{file}: {elements.name}"
     return _check(label, elements.a_m, elements.e, elements.i_rad, elements.epoch_tai_s, limits, now_tai_s)
+
+
+def check_ephemeris(propagator: OemPropagator, limits: ElementLimits, now_tai_s: float) -> tuple[list[str], list[str]]:
+    """Check that an ephemeris covers the present and that its orbit there lies within the limits.
+
+    Its age does not count: it says itself how long it holds.  Returns: errors and warnings as texts.
+    """
+    ephemeris = propagator.ephemeris
+    label = f"{ephemeris.file}: {ephemeris.label}"
+    try:
+        orbit = osculating_from_state(*propagator.states_teme(np.array([now_tai_s])))
+    except OrbitError:
+        now = utc_text(now_tai_s, 0)
+        text = f"{label}: the ephemeris covers {ephemeris.coverage}, which {now} is not within; fetch one that does"
+        return [text], []
+    return _check(label, float(orbit.a_m[0]), float(orbit.e[0]), float(orbit.i_rad[0]), now_tai_s, limits, now_tai_s)
 
 
 def _check(
@@ -118,6 +146,26 @@ def select_elements(
     oldest = min(found, key=lambda one: one.epoch_tai_s)
     epoch = utc_text(oldest.epoch_tai_s, 0)
     return oldest, [f"{oldest.where}: {oldest.label}: every epoch is ahead of the clock, the oldest ({epoch}) is used"]
+
+
+def select_segments(
+    segments: Sequence[OemSegment], norad_id: int | None, name: str, *, is_whole: bool = True
+) -> list[OemSegment]:
+    """Choose a satellite's segments of an ephemeris.
+
+    A file with one satellite is taken as it is; else, or without is_whole (segments could not be read), the name must
+    fit (case, hyphens and blanks do not count), or the OBJECT_ID be the norad_id.
+    Raises:  ElementsError: none of this satellite, or two.
+    """
+    found = list(segments)
+    if not is_whole or len({one.label for one in segments}) > 1:
+        found = [one for one in segments if _plain(one.name) == _plain(name) or one.object_id == str(norad_id)]
+    labels = list(dict.fromkeys(one.label for one in found or segments))
+    if not found:
+        raise ElementsError(f"{segments[0].file}: no segment with name {name!r}; the file holds {', '.join(labels)}")
+    if len(labels) > 1:
+        raise ElementsError(f"{segments[0].file}: the name {name!r} fits {', '.join(labels)}; give each its own file")
+    return found
 
 
 def _matching(sets: Sequence[ElementSet], fits: Callable[[ElementSet], bool], wanted: str) -> list[ElementSet]:

@@ -59,6 +59,18 @@ def teme_from_itrs(r_itrs_m: Array, tai_s: Array, orientation: EarthOrientation)
     return _turn_z(r_pef_m, -gmst_rad(tai_s, orientation.ut1_utc_s))
 
 
+def teme_from_itrs_states(
+    r_itrs_m: Array, v_itrs_m_s: Array, tai_s: Array, orientation: EarthOrientation
+) -> tuple[Array, Array]:
+    """Turn Earth-fixed states into inertial ones, the inverse of `itrs_from_teme`; every array (N, 3)."""
+    pef = _itrs_from_pef(orientation)
+    r_pef_m, v_pef_m_s = r_itrs_m @ pef, v_itrs_m_s @ pef
+    v_pef_m_s[:, 0] -= EARTH_RATE_RAD_S * r_pef_m[:, 1]
+    v_pef_m_s[:, 1] += EARTH_RATE_RAD_S * r_pef_m[:, 0]
+    theta = -gmst_rad(tai_s, orientation.ut1_utc_s)
+    return _turn_z(r_pef_m, theta), _turn_z(v_pef_m_s, theta)
+
+
 def _turn_z(vectors: Array, angle_rad: Array) -> Array:
     """Coordinates of (N, 3) vectors in a frame turned by the angles (N,) about the z axis."""
     c, s = np.cos(angle_rad), np.sin(angle_rad)

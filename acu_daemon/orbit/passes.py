@@ -9,7 +9,7 @@ import numpy.typing as npt
 from acu_daemon.model import Pass, Site
 from acu_daemon.orbit.kepler import osculating_from_state
 from acu_daemon.orbit.look import look_at
-from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.orbit.propagator import Propagator, spans_tai_s
 from acu_daemon.units import MU_M3_S2, Array
 
 _STEPS_PER_REVOLUTION = 60.0
@@ -30,10 +30,32 @@ def find_passes(
     span.  A satellite that does not rise (set) within those has a pass that begins at the start (ends at the end) of
     the span; one that never comes up has none.
 
+    A source that has answers within spans only is searched there only; a pass cut by the end of such a span begins or
+    ends there.
+
     Method:  elevations on a grid of a sixtieth of a revolution (finer for eccentric orbits), every local extremum
              refined by golden section, then every crossing between neighbouring nodes by bisection.
     Raises:  OrbitError: the propagator has no answer for a time in the search.
     """
+
+    found: list[Pass] = []
+    for first_tai_s, last_tai_s in spans_tai_s(propagator):
+        start, end = max(start_tai_s, first_tai_s), min(end_tai_s, last_tai_s)
+        if start <= end:
+            found += _within(propagator, site, start, end, min_elevation_deg, first_tai_s, last_tai_s)
+    return found
+
+
+def _within(
+    propagator: Propagator,
+    site: Site,
+    start_tai_s: float,
+    end_tai_s: float,
+    min_elevation_deg: float,
+    first_tai_s: float,
+    last_tai_s: float,
+) -> list[Pass]:
+    """The passes that touch start to end; no time before the first or after the last one is asked for."""
 
     def height(tai_s: Array) -> Array:
         return look_at(propagator, tai_s, site).el_deg - min_elevation_deg
@@ -41,20 +63,17 @@ def find_passes(
     revolution_s, step_s = _revolution_and_step_s(propagator, start_tai_s)
     is_up_first, is_up_last = height(np.array([start_tai_s, end_tai_s])) >= 0.0
     beyond_s = _REVOLUTIONS_BEYOND * revolution_s
-    nodes = _nodes(
-        height,
-        start_tai_s - (beyond_s if is_up_first else step_s),
-        end_tai_s + (beyond_s if is_up_last else step_s),
-        step_s,
-    )
+    low_s = start_tai_s - (beyond_s if is_up_first else step_s)
+    high_s = end_tai_s + (beyond_s if is_up_last else step_s)
+    nodes = _nodes(height, max(low_s, first_tai_s), min(high_s, last_tai_s), step_s)
     heights = height(nodes)
     is_up = heights >= 0.0
     rises = _crossings(height, nodes, ~is_up[:-1] & is_up[1:], step_s, is_rising=True)
     sets = _crossings(height, nodes, is_up[:-1] & ~is_up[1:], step_s, is_rising=False)
     if is_up[0]:
-        rises = np.concatenate([[start_tai_s], rises])
+        rises = np.concatenate([[start_tai_s if low_s >= first_tai_s else first_tai_s], rises])
     if is_up[-1]:
-        sets = np.concatenate([sets, [end_tai_s]])
+        sets = np.concatenate([sets, [end_tai_s if high_s <= last_tai_s else last_tai_s]])
     return [
         _pass(propagator, site, rise, setting, nodes[(nodes > rise) & (nodes < setting)])
         for rise, setting in zip(rises.tolist(), sets.tolist(), strict=True)

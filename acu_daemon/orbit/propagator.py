@@ -1,6 +1,7 @@
 """What every source of orbits can do."""
 
-from typing import Protocol
+from math import inf
+from typing import Protocol, runtime_checkable
 
 from acu_daemon.model import Correction
 from acu_daemon.units import Array
@@ -29,3 +30,17 @@ class Propagator(Protocol):
 
         The correction is absolute: it replaces one given before, and `Correction()` gives the source itself.
         """
+
+
+@runtime_checkable
+class Bounded(Protocol):
+    """A source that has answers only within spans of time, such as an ephemeris."""
+
+    @property
+    def spans_tai_s(self) -> tuple[tuple[float, float], ...]:
+        """Start and end of every span, in order, ends included, without overlap."""
+
+
+def spans_tai_s(propagator: Propagator) -> tuple[tuple[float, float], ...]:
+    """When a source has answers: its spans, or for most sources always."""
+    return propagator.spans_tai_s if isinstance(propagator, Bounded) else ((-inf, inf),)

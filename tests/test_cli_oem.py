@@ -1,0 +1,192 @@
+"""An ephemeris as the elements of a satellite: loading, and the commands on it."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import Done, acu_daemon
+from config_files import STATION, from_file, write
+from made_oems import START, iss, kvn, states, xml
+from real_passes import sky_angles_deg
+
+from acu_daemon.cli.options import coming_pass, load_target
+from acu_daemon.config import load_satellite, load_station
+from acu_daemon.edge.elements_file import LoadedElements, load_elements
+from acu_daemon.errors import ElementsError, UsageError
+from acu_daemon.model import EarthOrientation, Pass, Site, Station
+from acu_daemon.orbit.frames import itrs_from_teme
+from acu_daemon.orbit.look import look_at
+from acu_daemon.orbit.passes import find_passes
+from acu_daemon.orbit.timescales import utc_text
+from acu_daemon.units import DAY_S
+
+HOUR_S = 3600.0
+SITE = Site(Station("station", -15.53, -56.07, 277.0))  # of config_files.STATION
+SATELLITE = from_file("ISS", "oem", "iss.oem")
+
+
+def make(directory: Path, text: str, satellite: str = SATELLITE, station: str = STATION) -> Path:
+    write(directory, station, iss=satellite)
+    (directory / "satellites" / "iss.oem").write_text(text)
+    return directory
+
+
+def load(directory: Path, text: str, now_tai_s: float = START + 60.0, satellite: str = SATELLITE) -> LoadedElements:
+    make(directory, text, satellite)
+    section, _ = load_satellite(directory, "iss", load_station(directory))
+    return load_elements(section, directory / "satellites" / "iss.toml", now_tai_s)
+
+
+def refusal(directory: Path, text: str, satellite: str = SATELLITE) -> str:
+    with pytest.raises(ElementsError) as error:
+        load(directory, text, satellite=satellite)
+    return str(error.value).replace(str(directory), "DIR")
+
+
+def first_high_pass() -> Pass:
+    return next(one for one in find_passes(iss(), SITE, START + 600.0, START + DAY_S, 5.0) if one.duration_s > 400.0)
+
+
+@pytest.mark.parametrize("form", [kvn, xml])
+def test_an_ephemeris_is_the_source(tmp_path: Path, form) -> None:
+    loaded = load(tmp_path, form(states()))
+    assert (loaded.label, loaded.propagator.kind, loaded.epoch_tai_s) == ("ISS (1998-067-A)", "oem", START)
+    assert (loaded.errors, loaded.warnings) == ([], [])
+
+
+@pytest.mark.parametrize("away_s", [-100.0, 7300.0])
+def test_a_present_outside_the_span_is_an_error_that_names_it(tmp_path: Path, away_s: float) -> None:
+    [error] = load(tmp_path, kvn(states()), START + away_s).errors
+    assert error.startswith(f"{tmp_path}/satellites/iss.oem: ISS (1998-067-A): the ephemeris covers ")
+    assert "2022-02-11T20:00:00Z to 2022-02-11T22:00:00Z, which 2022-02-11T" in error
+
+
+def test_limits_hold_for_ephemerides_too(tmp_path: Path) -> None:
+    narrow = SATELLITE + "[elements.limits]\nmax_inclination_deg = 40.0\n"
+    [error] = load(tmp_path, kvn(states()), satellite=narrow).errors
+    assert "inclination 51.6" in error
+
+
+def test_a_bad_file_is_refused_with_the_line_and_a_bad_segment_warned_of(tmp_path: Path) -> None:
+    assert refusal(tmp_path, kvn(states(), REF_FRAME="MOD")).startswith(
+        "DIR/satellites/iss.oem, line 6: REF_FRAME is 'MOD'; TEME, TOD"
+    )
+    assert refusal(tmp_path, "").endswith("iss.oem: no orbit ephemeris message in it (KVN or XML)")
+    assert refusal(tmp_path, kvn(states()), from_file("ISS", "oem", "x.oem")).endswith("No such file or directory")
+    half = kvn(states(600.0), states(600.0, start_tai_s=START + 900.0)).replace("T20:16:00.000000", "T20:16:00.0x")
+    loaded = load(tmp_path, half)
+    assert loaded.errors == []
+    assert "is not a time" in loaded.warnings[0]
+
+
+def test_of_several_satellites_the_name_chooses(tmp_path: Path) -> None:
+    both = kvn(states(600.0), OBJECT_NAME="OTHER", OBJECT_ID="25544") + kvn(states())
+    assert load(tmp_path, both).label == "ISS (1998-067-A)"
+    assert load(tmp_path, both, satellite=from_file("x", "oem", "iss.oem", 25544)).label == "OTHER (25544)"
+    assert refusal(tmp_path, both, from_file("MIR", "oem", "iss.oem")) == (
+        "DIR/satellites/iss.oem: no segment with name 'MIR'; the file holds OTHER (25544), ISS (1998-067-A)"
+    )
+    twice = kvn(states(600.0), OBJECT_ID="1") + kvn(states())
+    assert "fits ISS (1), ISS (1998-067-A); give each its own file" in refusal(tmp_path, twice)
+    damaged = kvn(states(600.0), OBJECT_NAME="OTHER") + kvn(states()).replace("T20:16:00.000000", "x")
+    assert "no segment with name 'ISS'" in refusal(tmp_path, damaged)
+
+
+def test_the_stations_earth_orientation_reaches_an_earth_fixed_ephemeris(tmp_path: Path) -> None:
+    tai_s, r_m, v_m_s = states()
+    turned = EarthOrientation(0.4)
+    text = kvn((tai_s, *itrs_from_teme(r_m, v_m_s, tai_s, turned)), REF_FRAME="ITRF2020")
+    make(tmp_path, text, station=STATION + "[time]\nut1_utc_s = 0.4\n")
+    propagator = load_target(tmp_path, "iss", START).elements.propagator
+    assert np.abs(propagator.states_teme(tai_s)[0] - r_m).max() < 1e-3
+
+
+def passes(config: Path, *more: object) -> Done:
+    return acu_daemon("passes", "--config", config, "--satellite", "iss", "--json", *more)
+
+
+def test_passes_are_those_of_the_orbit_and_the_end_of_the_ephemeris_is_told(tmp_path: Path) -> None:
+    config = make(tmp_path, kvn(states(0.8 * DAY_S)))
+    done = passes(config, "--from", utc_text(START, 0))
+    wanted = find_passes(iss(), SITE, START, START + 0.8 * DAY_S, 5.0)
+    assert done.code == 0
+    assert [one["rise_utc"][:22] for one in json.loads(done.out)] == [utc_text(one.rise_tai_s)[:22] for one in wanted]
+    assert "warning: iss: the ephemeris ends at 2022-02-12T15:12:00Z, no pass is looked for after that" in done.err
+
+
+def test_passes_before_or_after_the_ephemeris_are_none_and_the_reason_is_told(tmp_path: Path) -> None:
+    config = make(tmp_path, kvn(states()))
+    done = passes(config, "--from", utc_text(START + DAY_S, 0))
+    assert (done.code, json.loads(done.out)) == (0, [])
+    assert "the ephemeris covers 2022-02-11T20:00:00Z to 2022-02-11T22:00:00Z" in done.err
+
+
+def coming_of(directory: Path, start_tai_s: float, end_tai_s: float, now_tai_s: float) -> Pass:
+    """The coming pass over the station with an ephemeris of a state a minute."""
+    make(directory, kvn(states(end_tai_s - start_tai_s, start_tai_s=start_tai_s)))
+    return coming_pass(load_target(directory, "iss", now_tai_s), now_tai_s)
+
+
+def test_the_coming_pass_must_be_covered_from_its_preparation_to_its_last_buffer(tmp_path: Path) -> None:
+    one = first_high_pass()
+    rise, end, now = one.rise_tai_s, one.set_tai_s, one.rise_tai_s - 300.0
+    assert coming_of(tmp_path, rise - 330.0, end + 300.0, now).rise_tai_s == pytest.approx(rise, abs=0.01)
+    assert coming_of(tmp_path, rise + 9.0, end + 300.0, rise + 100.0).set_tai_s == pytest.approx(end, abs=0.01)
+    for start_tai_s, end_tai_s, now_tai_s in (
+        (rise - 330.0, end + 30.0, now),
+        (rise - 100.0, end + 300.0, rise - 99.0),
+        (rise + 9.0, end + 300.0, rise + 40.0),
+    ):
+        with pytest.raises(UsageError, match=r"needs an ephemeris from .* fetch a longer one"):
+            coming_of(tmp_path, start_tai_s, end_tai_s, now_tai_s)
+    with pytest.raises(UsageError, match=r"within 3 days of .*; the ephemeris ends at"):
+        coming_of(tmp_path, rise - 900.0, rise - 300.0, rise - 600.0)
+
+
+def test_check_says_no_go_where_the_next_pass_is_not_covered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = first_high_pass()
+    now = one.rise_tai_s - 300.0
+    monkeypatch.setattr("acu_daemon.edge.clock.SystemClock.tai_s", lambda _: now)
+    for spare_s, verdict in ((300.0, "GO    "), (10.0, "NO-GO ")):
+        minutes = np.ceil((one.set_tai_s + spare_s - now + 60.0) / 60.0)
+        make(tmp_path, kvn(states(60.0 * minutes - (0.0 if spare_s > 60.0 else 60.0), start_tai_s=now - 60.0)))
+        lines = acu_daemon("check", "--config", tmp_path, "--satellite", "iss").out.splitlines()
+        [line] = [line for line in lines if "iss: next pass" in line]
+        assert line.startswith(verdict), lines
+
+
+@pytest.mark.parametrize("estimator", ["kalman", "full"])
+def test_replay_finds_the_satellite_of_an_ephemeris_that_runs_late(tmp_path: Path, estimator: str) -> None:
+    one = first_high_pass()
+    tai_s, r_m, v_m_s = states(one.set_tai_s + 300.0 - START)
+    make(tmp_path, kvn((tai_s + 3.0, r_m, v_m_s)))
+    times = np.arange(np.ceil(one.rise_tai_s), one.set_tai_s, 1.0)
+    sky = look_at(iss(), times, SITE)
+    half = times.size // 2
+    rng = np.random.default_rng(4)
+    rows = ["utc,az_deg,el_deg,locked"]
+    for count, (time, az, el) in enumerate(zip(times.tolist(), sky.az_deg, sky.el_deg, strict=True)):
+        noisy = f"{(az + 0.03 / np.cos(np.radians(el)) * rng.normal()) % 360.0:.4f},{el + 0.03 * rng.normal():.4f}"
+        rows.append(f"{utc_text(time)},{noisy if count < half else ','},{int(count < half)}")
+    (tmp_path / "in.csv").write_text("\n".join(rows) + "\n")
+    files = ("--readings", tmp_path / "in.csv", "--out", tmp_path / "out.csv", "--estimator", estimator)
+    done = acu_daemon("replay", "--config", tmp_path, "--satellite", "iss", *files)
+    assert done.code == 0, done.err
+    with (tmp_path / "out.csv").open() as file:
+        found = np.array([(float(row["az_deg"]), float(row["el_deg"])) for row in csv.DictReader(file)])
+    off_deg = sky_angles_deg(found[:, 0], found[:, 1], sky.az_deg, sky.el_deg)
+    assert off_deg[0] > 0.2
+    assert off_deg[half:].max() < 0.04
+
+
+def test_replay_of_a_recording_outside_the_ephemeris_is_refused(tmp_path: Path) -> None:
+    make(tmp_path, kvn(states()))
+    (tmp_path / "in.csv").write_text(f"utc,az_deg,el_deg,locked\n{utc_text(START - 60.0)},10.0,20.0,1\n")
+    done = acu_daemon(
+        *("replay", "--config", tmp_path, "--satellite", "iss"),
+        *("--readings", tmp_path / "in.csv", "--out", tmp_path / "out.csv"),
+    )
+    assert done.code == 2
+    assert "the ephemeris covers 2022-02-11T20:00:00Z to" in done.err
