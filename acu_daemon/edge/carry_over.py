@@ -7,7 +7,7 @@ import math
 import os
 import re
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +40,7 @@ def read_carry_over(path: Path) -> CarryOver | None:
         return _from_json(json.loads(text))
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
+    except (OSError, ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
         reason = f"{type(error).__name__}: {error}"
         structlog.get_logger("carry_over").warning("carry_over.unreadable", file=str(path), reason=reason)
         return None
@@ -149,12 +149,12 @@ def _from_json(read: Any) -> CarryOver:
     return CarryOver(
         at_tai_s=_number(read["at_tai_s"]),
         estimator=str(read["estimator"]),
-        station=Station(str(station.pop("name")), **_fields(station)),
+        station=Station(str(station["name"]), **_fields(station, Station, text="name")),
         elements_kind=str(elements["kind"]),
         elements_epoch_tai_s=_number(elements["epoch_tai_s"]),
         states=_numbers(elements["states_teme_m_m_s"], (2, 6)),
-        correction=Correction(**_fields(read["correction"])),
-        bias=AngleBias(**_fields(read["bias"])),
+        correction=Correction(**_fields(read["correction"], Correction)),
+        bias=AngleBias(**_fields(read["bias"], AngleBias)),
         station_shift_enu_m=(east_m, north_m, up_m),
         covariance=_covariance(read["covariance"]),
     )
@@ -166,8 +166,11 @@ def _number(value: Any) -> float:
     return float(value)
 
 
-def _fields(values: dict[str, Any]) -> dict[str, float]:
-    return {name: _number(value) for name, value in values.items()}
+def _fields(values: Any, kind: type[Correction | AngleBias | Station], text: str = "") -> dict[str, float]:
+    names = {field.name for field in fields(kind)}
+    if not isinstance(values, dict) or set(values) != names:
+        raise ValueError(f"expected {', '.join(sorted(names))}")
+    return {name: _number(value) for name, value in values.items() if name != text}
 
 
 def _numbers(values: Any, shape: tuple[int, ...]) -> Array:
