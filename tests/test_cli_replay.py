@@ -83,7 +83,7 @@ def test_a_real_pass_is_predicted_through_its_loss_in_the_format_of_the_design(
     out = tmp_path / "out.csv"
     done = replay(config, readings, out, *(["--estimator", estimator] if estimator else []))
     assert (done.code, done.out) == (0, "")
-    assert ("kalman runs in its place" in done.err) == (estimator in (None, "full"))
+    assert done.err == ""
     text = out.read_bytes()
     assert text.startswith(b"utc,az_deg,el_deg,sigma_deg,source\n")
     assert text.endswith(b"\n")
@@ -95,12 +95,40 @@ def test_a_real_pass_is_predicted_through_its_loss_in_the_format_of_the_design(
         assert re.fullmatch(r"\d{1,3}\.\d{5}", row["az_deg"])
         assert re.fullmatch(r"-?\d{1,2}\.\d{5}", row["el_deg"])
         assert 0.0 <= float(row["az_deg"]) < 360.0
-        assert row["sigma_deg"] == ""
+        assert (row["sigma_deg"] != "") == (estimator in (None, "full") and row["source"].endswith("FITTED"))
         assert row["source"] in list(TrackState)
     lost = np.array([row["locked"] == "0" for row in asked])
     az, el = (np.array([float(row[key]) for row in rows]) for key in ("az_deg", "el_deg"))
     assert sky_angles_deg(az, el, *sky)[lost].max() < 0.1
     assert {row["source"] for row, is_lost in zip(rows, lost, strict=True) if is_lost} == {"HOLD/FITTED"}
+
+
+@needs_data
+def test_all_estimators_are_compared_in_files_beside_the_named_one_a_table_and_a_picture(
+    tmp_path: Path, config: Path, real: RealPass
+) -> None:
+    readings, (az_deg, el_deg) = recorded(tmp_path / "in.csv", real, step_s=5.0)
+    lines = readings.read_text().splitlines()
+    for k, line in enumerate(lines[1:]):
+        if line.endswith(",,,0"):
+            lines[k + 1] = line.replace(",,,0", f",{az_deg[k]:.5f},{el_deg[k]:.5f},0")
+    readings.write_text("\n".join(lines) + "\n")
+    done = replay(config, readings, tmp_path / "out.csv", "--estimator", "all")
+    assert done.code == 0, done.err
+    made = {path.name for path in tmp_path.glob("out*")}
+    assert made == {"out.png", *(f"out-{name}.csv" for name in ESTIMATORS)}
+    assert (tmp_path / "out.png").read_bytes().startswith(b"\x89PNG")
+    what, _, header, *table = done.out.splitlines()
+    assert what.startswith(f"Prediction against {sum(line.endswith(',0') for line in lines)} readings without lock")
+    assert header.split()[:4] == ["estimator", "median", "deg", "95"]
+    assert [row.split()[0] for row in table] == list(ESTIMATORS)
+    for row in table:
+        median_deg, p95_deg, worst_deg = map(float, row.split()[1:4])
+        assert median_deg <= p95_deg <= worst_deg < 0.1
+        assert re.search(r" \d+\.\d{3} s (early|late), [+-]\d\.\d{4} deg across +\d+\.\d\d$", row)
+    alone = tmp_path / "alone.csv"
+    assert replay(config, readings, alone, "--estimator", "full").code == 0
+    assert alone.read_bytes() == (tmp_path / "out-full.csv").read_bytes()
 
 
 @needs_data
@@ -197,6 +225,7 @@ def test_wrong_use_ends_with_status_2_and_a_reason(tmp_path: Path, config: Path,
         (replay(config, readings, tmp_path), "Is a directory"),
         (replay(config, readings, readings), "is the recording itself"),
         (replay(config, readings, tmp_path / "o", "--estimator", "best"), "no estimator 'best': expected one of"),
+        (replay(config, readings, tmp_path / "no" / "o", "--estimator", "all"), "no/o-circular: No such file"),
         (replay(config, readings, tmp_path / "o", satellite="moon"), "no such file; satellites in"),
         (replay(tmp_path / "nowhere", readings, tmp_path / "o"), "station.toml: no such file"),
         (acu_daemon("replay", "--config", config), "Missing option"),

@@ -1,0 +1,76 @@
+"""Estimators side by side: which readings are compared, and what the table says."""
+
+import numpy as np
+import pytest
+
+from acu_daemon.control.comparison import Comparison, compare
+from acu_daemon.control.replay import Replayed
+from acu_daemon.control.states import TrackState
+from acu_daemon.model import Correction, FitResult, Reading
+from acu_daemon.report.comparison import table, what_is_compared
+
+FIT = FitResult("one", Correction(), 0.0, 10, 0, 0.0, along_s=-1.25, across_deg=0.01)
+
+
+def lines(flags: str) -> list[tuple[float, Reading | None]]:
+    """A line a second: L locked, u not, with angles; - without angles.  The antenna shows azimuth 100, elevation 30."""
+    return [
+        (float(k), None if flag == "-" else Reading(float(k), 100.0, 30.0, flag == "L")) for k, flag in enumerate(flags)
+    ]
+
+
+def predicted(count: int, first_fit: int, off_deg: float) -> list[Replayed]:
+    """Predictions that are wrong by off_deg in elevation, fitted from a line on."""
+    return [
+        Replayed(100.0, 30.0 + off_deg, None, TrackState.HOLD_FITTED, FIT if k >= first_fit else None)
+        for k in range(count)
+    ]
+
+
+def compared(flags: str, **first_fits: int) -> Comparison:
+    results = {name: predicted(len(flags), first, 0.1) for name, first in first_fits.items()}
+    return compare(lines(flags), results, lock_dwell_s=1.0)
+
+
+@pytest.mark.parametrize(
+    ("flags", "at", "is_held_back"),
+    [
+        ("uuLLLLuu", [6, 7], True),  # what came before the first lock is the antenna's own way
+        ("LLLL-u-u", [5, 7], True),
+        ("LLLLuLLu", [4, 7], True),  # acquired but not for the dwell is neither
+        ("LLLL--", [2, 3], False),
+        ("LLLLLL", [2, 3, 4, 5], False),
+        ("uuu---", [], False),
+    ],
+)
+def test_readings_without_lock_after_the_first_lock_are_compared_else_locked_ones(
+    flags: str, at: list[int], is_held_back: bool
+) -> None:
+    seen = compared(flags, one=2)
+    assert seen.errors["one"].tai_s.tolist() == at
+    assert seen.is_held_back == is_held_back
+    assert seen.errors["one"].error_deg == pytest.approx([0.1] * len(at))
+
+
+def test_all_are_compared_where_all_that_ever_fit_have_fitted() -> None:
+    seen = compared("LLLLLLLL", early=1, late=5, never=99)
+    assert {name: errors.tai_s.tolist() for name, errors in seen.errors.items()} == {
+        "early": [5, 6, 7],
+        "late": [5, 6, 7],
+        "never": [5, 6, 7],
+    }
+    assert [fit is None for fit in seen.last_fit.values()] == [False, False, True]
+
+
+def test_the_table_says_what_was_compared_and_how_far_off_the_last_fit_was() -> None:
+    said = table(compared("LLLLuu", one=2, none=99), {"one": 1.234, "none": 0.1})
+    assert said[0].startswith("Prediction against 2 readings without lock")
+    assert said[3].split() == ["one", *["0.1000"] * 3, "1.250", "s", "early,", "+0.0100", "deg", "across", "1.23"]
+    assert said[4].split()[-2:] == ["none", "0.10"]
+
+
+def test_without_anything_to_compare_the_table_has_dashes() -> None:
+    seen = compared("uu--", one=99)
+    assert what_is_compared(seen) == "Nothing to compare: no reading with angles after the first fit."
+    assert table(seen, {"one": 0.0})[3].split()[:4] == ["one", "-", "-", "-"]
+    assert seen.errors["one"].error_deg.shape == np.empty(0).shape
