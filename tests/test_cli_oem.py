@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from command_line import Done, acu_daemon
 from config_files import STATION, from_file, write
+from flights import events_named, flight_of, state_at, worst_error_deg
 from made_oems import START, iss, kvn, states, xml
 from real_passes import sky_angles_deg
 
@@ -20,6 +21,7 @@ from acu_daemon.orbit.frames import itrs_from_teme
 from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.timescales import utc_text
+from acu_daemon.sim.scenario import AcuChoice
 from acu_daemon.units import DAY_S
 
 HOUR_S = 3600.0
@@ -162,7 +164,7 @@ def test_replay_finds_the_satellite_of_an_ephemeris_that_runs_late(tmp_path: Pat
     one = first_high_pass()
     tai_s, r_m, v_m_s = states(one.set_tai_s + 300.0 - START)
     make(tmp_path, kvn((tai_s + 3.0, r_m, v_m_s)))
-    times = np.arange(np.ceil(one.rise_tai_s), one.set_tai_s, 1.0)
+    times = np.arange(np.ceil(one.rise_tai_s), one.set_tai_s, 2.0)
     sky = look_at(iss(), times, SITE)
     half = times.size // 2
     rng = np.random.default_rng(4)
@@ -190,3 +192,16 @@ def test_replay_of_a_recording_outside_the_ephemeris_is_refused(tmp_path: Path) 
     )
     assert done.code == 2
     assert "the ephemeris covers 2022-02-11T20:00:00Z to" in done.err
+
+
+def test_the_daemon_stays_on_a_satellite_that_runs_off_its_ephemeris_through_a_loss(tmp_path: Path) -> None:
+    one = first_high_pass()
+    begin = one.rise_tai_s + 60.0
+    make(tmp_path, kvn(states(one.set_tai_s + 300.0 - START)))
+    target = load_target(tmp_path, "iss", begin)
+    look = look_at(iss(), np.array([begin]), SITE)
+    antenna = AcuChoice(azimuth_deg=float(look.az_deg[0]), elevation_deg=float(look.el_deg[0]))
+    flight = flight_of(target, begin, 60.0, antenna=antenna, losses=[(30.0, 55.0)])
+    assert state_at(flight, begin + 50.0) == "HOLD/FITTED"
+    assert events_named(flight, "fit.failed") == []
+    assert worst_error_deg(flight, begin + 31.0, begin + 55.0) < 0.1
