@@ -185,6 +185,14 @@ class Prediction:
     def end_tai_s(self) -> float:
         return self.start_tai_s + self.step_s * (self.az_deg.size - 1)
 
+    def seconds_inside(self, tai_s: float, limit_deg: float) -> float | None:
+        """Seconds from an instant until 3 sigma exceed a limit, at most to the buffer's end; None without a sigma."""
+        if self.sigma_deg is None:
+            return None
+        first = min(max(round((tai_s - self.start_tai_s) / self.step_s), 0), self.sigma_deg.size - 1)
+        beyond = np.flatnonzero(3.0 * self.sigma_deg[first:] > limit_deg)
+        return self.step_s * float(beyond[0] if beyond.size else self.sigma_deg.size - 1 - first)
+
     def at(self, tai_s: float, *, follow: bool = False) -> Pointing | None:
         """Interpolate by cubic Hermite polynomials (smooth in rate); None outside the buffer."""
         x = (tai_s - self.start_tai_s) / self.step_s

@@ -21,6 +21,8 @@ SEEN = Snapshot(
     along_s=-0.874,
     across_deg=0.031,
     fit_age_s=0.4,
+    sigma_deg=0.012,
+    inside_s=61.0,
     buffer_s=88.7,
     buffer_kind="FITTED",
     lag_az_s=0.0125,
@@ -38,8 +40,15 @@ SEEN = Snapshot(
 
 def test_it_says_state_angles_miss_correction_and_buffer() -> None:
     text = live_text(SEEN)
-    assert text.startswith("12:44:11.4Z AUTOTRACK/FITTED")
-    for part in ("az  167.43 el  58.01", "0.021 deg", "0.87 s early", "+0.031 deg across", "buffer   89 s FITTED"):
+    assert text.startswith("12:44:11.4Z  AUTOTRACK/FITTED")
+    for part in (
+        "az  167.43 el  58.01",
+        "0.021 deg",
+        "0.87 s early",
+        "+0.031 deg across",
+        "in beam 61 s",
+        "buffer  89 s FITTED",
+    ):
         assert part in text
     assert "\n" not in text
 
@@ -49,7 +58,8 @@ def test_late_is_positive_and_early_negative() -> None:
 
 
 def test_rehearsal_and_simulation_stand_on_it() -> None:
-    assert live_text(replace(SEEN, is_rehearsal=True, is_simulation=True)).endswith("SIMULATION REHEARSAL")
+    text = live_text(replace(SEEN, is_rehearsal=True, is_simulation=True))
+    assert text.startswith("12:44:11.4Z SIMULATION REHEARSAL")  # before all that a narrow terminal cuts off
     assert "SIMULATION" not in live_text(SEEN)
 
 

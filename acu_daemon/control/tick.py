@@ -196,11 +196,8 @@ def _walk(
 
 def _is_sure(sky: Sky, now_tai_s: float, config: ControlConfig) -> bool:
     """Whether 3 sigma of the prediction still lie within half the beam (only for estimators that know a sigma)."""
-    prediction = sky.prediction
-    if prediction is None or prediction.sigma_deg is None:
-        return False
-    i = round((now_tai_s - prediction.start_tai_s) / prediction.step_s)
-    return 0 <= i < prediction.sigma_deg.size and 3.0 * float(prediction.sigma_deg[i]) <= config.beamwidth_deg / 2
+    inside_s = sky.prediction.seconds_inside(now_tai_s, config.beamwidth_deg / 2) if sky.prediction else None
+    return inside_s is not None and inside_s > 0.0
 
 
 # What it is told

@@ -46,6 +46,8 @@ class Snapshot:
     along_s: float | None
     across_deg: float | None
     fit_age_s: float | None
+    sigma_deg: float | None  # of the predicted direction now
+    inside_s: float | None  # until 3 sigma leave the half-power beam; the buffer's length where they do not
     buffer_s: float
     buffer_kind: str
     lag_az_s: float

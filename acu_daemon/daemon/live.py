@@ -1,5 +1,6 @@
 """The live line of a terminal: state, angles, error, correction, buffer; redrawn in place five times a second."""
 
+import shutil
 import sys
 from typing import TextIO
 
@@ -27,10 +28,23 @@ def live_text(seen: Snapshot, beam_error_deg: float | None = None) -> str:
         correction = f"{abs(seen.along_s):5.2f} s {side:5} {seen.across_deg:+6.3f} deg across"
     else:
         correction = "no fit yet"
-    return (
-        f"{utc_text(seen.tai_s, 1)[11:]} {seen.state:16} {antenna}  {miss}  {correction}  "
-        f"buffer {seen.buffer_s:4.0f} s {seen.buffer_kind:6} {mark}"
-    ).rstrip()
+    parts = [
+        f"{utc_text(seen.tai_s, 1)[11:]} {mark}".rstrip(),
+        f"{seen.state:16} {antenna}",
+        miss,
+        correction,
+        _inside(seen),
+        f"buffer {seen.buffer_s:3.0f} s {seen.buffer_kind}",
+    ]
+    return "  ".join(part for part in parts if part).rstrip()
+
+
+def _inside(seen: Snapshot) -> str:
+    """How long the prediction stays within the half-power beam by its own sigma."""
+    if seen.inside_s is None:
+        return ""
+    sign = ">" if seen.inside_s >= seen.buffer_s - 0.2 else ""
+    return f"in beam {sign}{seen.inside_s:.0f} s"
 
 
 class LiveLine:
@@ -44,7 +58,8 @@ class LiveLine:
     def show(self, seen: Snapshot, beam_error_deg: float | None = None) -> None:
         self._skip = (self._skip + 1) % EVERY_TICKS
         if self._skip == 0:
-            self._stream.write("\r\033[K" + live_text(seen, beam_error_deg))
+            columns = shutil.get_terminal_size().columns
+            self._stream.write("\r\033[K" + live_text(seen, beam_error_deg)[: columns - 1])
             self._stream.flush()
             self._is_drawn = True
 

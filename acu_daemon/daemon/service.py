@@ -20,7 +20,7 @@ from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.fit import FitRunner
 from acu_daemon.edge.link import Link
 from acu_daemon.errors import NoAcuError, UsageError
-from acu_daemon.model import FitResult, Pass, Reading, sky_angle_deg
+from acu_daemon.model import FitResult, Pass, Prediction, Reading, sky_angle_deg
 
 FIRST_POLL_S = 10.0  # no good poll within this of the start ends the run
 STOP_DEADLINE_S = 1.0
@@ -236,6 +236,8 @@ class Service:
             along_s=sky.fit.along_s if sky.fit else None,
             across_deg=sky.fit.across_deg if sky.fit else None,
             fit_age_s=now_tai_s - sky.fit.at_tai_s if sky.fit else None,
+            sigma_deg=_sigma_deg(prediction, now_tai_s),
+            inside_s=prediction.seconds_inside(now_tai_s, self._job.control.beamwidth_deg / 2) if prediction else None,
             buffer_s=max(0.0, prediction.end_tai_s - now_tai_s) if prediction else 0.0,
             buffer_kind=prediction.kind if prediction else "",
             lag_az_s=lag_az_s,
@@ -278,3 +280,10 @@ def _innermost(error: Exception) -> Exception:
     while isinstance(error, ExceptionGroup) and len(error.exceptions) == 1:
         error = error.exceptions[0]
     return error
+
+
+def _sigma_deg(prediction: Prediction | None, tai_s: float) -> float | None:
+    if prediction is None or prediction.sigma_deg is None:
+        return None
+    i = round((tai_s - prediction.start_tai_s) / prediction.step_s)
+    return float(prediction.sigma_deg[min(max(i, 0), prediction.sigma_deg.size - 1)])
