@@ -87,7 +87,7 @@ class OemPropagator:
 
     The correction of the mean anomaly (and that of the mean motion times the seconds since the start) becomes a shift
     in time along the ephemeris, by its average mean motion: whatever the Earth's flattening does to the orbit, it does
-    to the shifted one as well.  A shift that leaves the span goes on by two-body motion (20 m off after a minute).
+    to the shifted one as well.  A shift that leaves the span goes on by two-body motion (30 m off after a minute).
     The other corrections are added to the osculating elements at each time.  What they change in the secular drifts is
     left out: 0.01 deg of inclination (1.2 km) would move the ISS by 0.3 km a day.  Within a pass it does not show, the
     fit of node and anomaly takes it up.  `epoch_tai_s` is the start of the first span.
