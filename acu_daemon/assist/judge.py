@@ -59,15 +59,9 @@ class Judge:
             seen = offsets(self._source, self._site, fit, together, settings)
         except (OrbitError, np.linalg.LinAlgError):
             return None
-        count = len(questioned)
-        is_near = seen.angle_deg <= seen.near_deg
-        if np.mean(is_near[-count:]) < NEAR_SHARE:
+        old, new = seen.part(slice(None, -len(questioned))), seen.part(slice(-len(questioned), None))
+        if float(np.mean(new.is_near)) < NEAR_SHARE:
             return None
-        old = slice(None, -count)
-        if before is not None and np.mean(is_near[old][seen.tai_s[old] >= before.tai_s[-1] - PAST_S]) < NEAR_SHARE:
+        if before is not None and float(np.mean(old.is_near[old.tai_s >= old.tai_s[-1] - PAST_S])) < NEAR_SHARE:
             return None
-        return _newest(seen, count)
-
-
-def _newest(seen: Offsets, count: int) -> Offsets:
-    return Offsets(*(getattr(seen, name)[-count:] for name in Offsets.__slots__))
+        return new

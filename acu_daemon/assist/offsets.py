@@ -1,9 +1,9 @@
-"""Readings against a predicted path: how far off, how far off may be, how an axis accelerates.  Pure."""
+"""Readings against a predicted path: how far off, how far off may be, how the path accelerates.  Pure."""
 
-from dataclasses import dataclass
-from math import hypot
+from dataclasses import dataclass, fields
 
 import numpy as np
+import numpy.typing as npt
 
 from acu_daemon.assist.encoder import encoder_look, sigma_deg
 from acu_daemon.assist.settings import EstimatorSettings
@@ -11,13 +11,13 @@ from acu_daemon.model import FitResult, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import Array, wrap_180_array
 
+Flags = npt.NDArray[np.bool_]
+
 NEAR_BEAMS = 0.2
 NEAR_SIGMAS = 6.0
 HALF_STEP_S = 0.25  # of the difference of rates that gives a path's acceleration
 LEAST_COS_EL = 1e-3
-WINDOW_S = 1.0  # over which an axis' own acceleration is measured
-WINDOW_COUNT = 6
-MEASURED_SIGMAS = 5.0
+LEAST_SPAN_S = 0.5  # a drift is taken over
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,15 +41,22 @@ class Offsets:
         angle: Array = np.hypot(self.right_deg, self.up_deg)
         return angle
 
-    def drift_deg_s(self, newest_s: float) -> float:
-        """How fast the offset of the newest readings changes; 0 where they are too few to tell."""
+    @property
+    def is_near(self) -> Flags:
+        near: Flags = self.angle_deg <= self.near_deg
+        return near
+
+    def drift_deg_s(self, newest_s: float) -> tuple[float, float]:
+        """How fast the offset of the newest readings changes, right and up; 0 where they are too few to tell."""
         newest = self.tai_s >= self.tai_s[-1] - newest_s
-        t = self.tai_s[newest] - self.tai_s[-1]
-        if t.size < 3 or float(np.ptp(t)) < WINDOW_S:
-            return 0.0
-        t = t - t.mean()
-        right, up = (float(t @ y[newest] / (t @ t)) for y in (self.right_deg, self.up_deg))
-        return hypot(right, up)
+        t = self.tai_s[newest] - self.tai_s[newest].mean()
+        if t.size < 2 or float(np.ptp(t)) < LEAST_SPAN_S:
+            return 0.0, 0.0
+        return float(t @ self.right_deg[newest] / (t @ t)), float(t @ self.up_deg[newest] / (t @ t))
+
+    def part(self, which: slice) -> "Offsets":
+        """The offsets that a slice picks."""
+        return Offsets(*(getattr(self, item.name)[which] for item in fields(self)))
 
 
 def offsets(
@@ -75,22 +82,3 @@ def offsets(
         az_deg_s2=(seen.az_rate_deg_s[2 * count :] - seen.az_rate_deg_s[count : 2 * count]) / (2 * HALF_STEP_S),
         el_deg_s2=(seen.el_rate_deg_s[2 * count :] - seen.el_rate_deg_s[count : 2 * count]) / (2 * HALF_STEP_S),
     )
-
-
-def excess_acceleration(tai_s: Array, off_deg: Array, noise_deg: float) -> Array:
-    """Acceleration of readings against their path, deg/s^2, by a parabola through the last second of each, (N,).
-
-    What noise alone can show is taken off; 0 where the readings are too few.
-    """
-    excess = np.zeros(tai_s.size)
-    first = np.searchsorted(tai_s, tai_s - WINDOW_S - 1e-6)
-    for k in range(tai_s.size):
-        t = tai_s[first[k] : k + 1] - tai_s[k]
-        if t.size < WINDOW_COUNT:
-            continue
-        design = np.vander(t, 3)
-        inverse = np.linalg.pinv(design)
-        measured = 2.0 * float(inverse[0] @ off_deg[first[k] : k + 1])
-        sigma = 2.0 * noise_deg * float(np.linalg.norm(inverse[0]))
-        excess[k] = np.sign(measured) * max(0.0, abs(measured) - MEASURED_SIGMAS * sigma)
-    return excess

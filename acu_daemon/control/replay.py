@@ -60,11 +60,7 @@ def replay(
 
 def _request(waiting: list[Reading], tai_s: float) -> RefitRequest:
     return RefitRequest(
-        readings=Readings(
-            np.array([reading.tai_s for reading in waiting]),
-            np.array([reading.az_deg for reading in waiting]),
-            np.array([reading.el_deg for reading in waiting]),
-        ),
+        readings=Readings.of(waiting),
         start_tai_s=tai_s,
         horizon_s=BUFFER_S,
         now_tai_s=tai_s,

@@ -3,8 +3,9 @@
 from collections import deque
 from dataclasses import dataclass, field
 
-import numpy as np
-
+from acu_daemon.assist.gate import DWELL
+from acu_daemon.assist.model_choice import Model
+from acu_daemon.control.refit import GateVerdict
 from acu_daemon.control.state import ControlState, Sky
 from acu_daemon.model import Reading, Readings
 
@@ -18,15 +19,19 @@ class CommonArea:
     to_fit: deque[Reading] = field(default_factory=deque)  # locked readings the background has not taken yet
     refit_count: int = 0
     refit_failed_count: int = 0
+    gate: GateVerdict = GateVerdict()
+    model: Model = Model.ELEMENTS
+    dwell_count: int = 0  # readings acquired, but not yet for the dwell time
+
+    @property
+    def rejected_counts(self) -> dict[str, int]:
+        """Readings that no fit has seen, by reason."""
+        return {**self.gate.counts, **({DWELL: self.dwell_count} if self.dwell_count else {})}
 
     def take_readings(self) -> Readings:
         """Hand over the locked readings that wait to be fitted, oldest first."""
         taken = [self.to_fit.popleft() for _ in range(len(self.to_fit))]
-        return Readings(
-            np.array([reading.tai_s for reading in taken]),
-            np.array([reading.az_deg for reading in taken]),
-            np.array([reading.el_deg for reading in taken]),
-        )
+        return Readings.of(taken)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,3 +65,6 @@ class Snapshot:
     link_problem: str
     is_rehearsal: bool
     is_simulation: bool
+    model: str = ""  # what the prediction is made from
+    rejecting: str = ""  # why the newest readings are not fitted
+    rejected_counts: dict[str, int] = field(default_factory=dict)  # readings so far, by reason

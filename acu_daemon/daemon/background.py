@@ -7,7 +7,8 @@ from typing import Any
 
 import structlog
 
-from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup, before_fit, predict_from
+from acu_daemon.assist.gate import ABOVE_MAX_ELEVATION
+from acu_daemon.control.refit import GateVerdict, RefitReply, RefitRequest, RefitSetup, before_fit, predict_from
 from acu_daemon.control.state import PassPlan
 from acu_daemon.control.states import AUTOTRACKING, HOLDING, TrackState
 from acu_daemon.daemon.area import CommonArea
@@ -47,6 +48,7 @@ class Background:
         self._wake = asyncio.Event()
         self._last_tai_s = -1e18
         self._seen: TrackState | None = None
+        self._verdict = GateVerdict()
         self._log: Any = structlog.get_logger("fit")
 
     def wake(self) -> None:
@@ -91,7 +93,7 @@ class Background:
             self._log.warning("fit.failed", reason=str(error))
             self._predict_here(request)
             return
-        self._take(reply)
+        self._take(reply, has_readings=len(request.readings) > 0)
 
     def _predict_here(self, request: RefitRequest) -> None:
         """Without the fit process: keep the buffer filled from the last fit, else the elements; 2 ms in the loop."""
@@ -131,7 +133,21 @@ class Background:
             return point.az_deg
         return state.az_deg
 
-    def _take(self, reply: RefitReply) -> None:
+    def _report(self, reply: RefitReply) -> None:
+        """Log what the gate and the choice of the model have changed."""
+        before = self._verdict
+        self._verdict = reply.gate
+        if reply.gate.rejecting and reply.gate.rejecting != before.rejecting:
+            log = self._log.info if reply.gate.rejecting == ABOVE_MAX_ELEVATION else self._log.warning
+            log("fit.rejecting", reason=reply.gate.rejecting)
+        elif before.rejecting and not reply.gate.rejecting:
+            self._log.info("fit.accepting", rejected=reply.gate.counts)
+        if reply.gate.reset_count > before.reset_count:
+            self._log.warning("fit.reset", reason="newer readings belie what was fitted before")
+        if reply.model is not self._area.model:
+            self._log.info("model.changed", model=str(reply.model), before=str(self._area.model))
+
+    def _take(self, reply: RefitReply, *, has_readings: bool) -> None:
         area = self._area
         if reply.fit is not None and area.sky.fit is None:
             self._log.info(
@@ -141,11 +157,14 @@ class Background:
                 along_s=round(reply.fit.along_s, 3),
                 across_deg=round(reply.fit.across_deg, 4),
             )
+        if has_readings:
+            self._report(reply)
         for note in reply.notes:
             self._log.warning("fit.note", note=note)
         if reply.fit is not None and self._on_fit is not None:
             self._on_fit(reply.fit)
         area.refit_count += 1
+        area.gate, area.model = reply.gate, reply.model
         area.sky = replace(area.sky, prediction=reply.prediction, fit=reply.fit)
 
     def set_plan(self, plan: PassPlan) -> None:

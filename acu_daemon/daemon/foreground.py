@@ -141,10 +141,11 @@ class Foreground:
         sample_tai_s = answer.started_tai_s + delay_s
         if answer.first_byte_tai_s is not None:
             sample_tai_s = min(sample_tai_s, answer.first_byte_tai_s)
-        reading = Reading(sample_tai_s, status.az_deg, status.el_deg, is_acquired(status))
+        reading = Reading(sample_tai_s, status.az_deg, status.el_deg, is_acquired(status), status.agc_db)
         self._seen = replace(self._seen, status=status, reading=reading)
         if self._dwell.is_locked(reading) and self._area.state.track in AUTOTRACKING:
             self._area.to_fit.append(reading)
+        self._area.dwell_count = self._dwell.rejected_count
         if self._on_reading is not None:
             self._on_reading(reading)
 

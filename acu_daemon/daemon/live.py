@@ -35,6 +35,7 @@ def live_text(seen: Snapshot, beam_error_deg: float | None = None) -> str:
         correction,
         _inside(seen),
         f"buffer {seen.buffer_s:3.0f} s {seen.buffer_kind}",
+        f"rejecting: {seen.rejecting}" if seen.rejecting else "",
     ]
     return "  ".join(part for part in parts if part).rstrip()
 

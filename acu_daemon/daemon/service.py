@@ -12,6 +12,7 @@ from acu_daemon.control.causes import pass_end_tai_s
 from acu_daemon.control.plan import plan_pass
 from acu_daemon.control.refit import RefitSetup
 from acu_daemon.control.state import ControlConfig
+from acu_daemon.control.states import AUTOTRACKING
 from acu_daemon.daemon.area import CommonArea, Snapshot
 from acu_daemon.daemon.background import Background
 from acu_daemon.daemon.foreground import Foreground
@@ -250,6 +251,9 @@ class Service:
             link_problem=self._port.problem,
             is_rehearsal=self._job.is_rehearsal,
             is_simulation=identity is not None and identity.is_simulated,
+            model=str(self._area.model),
+            rejecting=self._area.gate.rejecting if state.track in AUTOTRACKING else "",
+            rejected_counts=self._area.rejected_counts,
         )
 
     def _outcome(self, reason: str, is_stopped: bool) -> Outcome:

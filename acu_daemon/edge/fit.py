@@ -11,6 +11,7 @@ import pickle
 import signal
 import struct
 import sys
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -132,12 +133,7 @@ class ProcessFitRunner:
 def _with_readings(request: RefitRequest, given: list[Readings]) -> RefitRequest:
     if not given:
         return request
-    together = Readings(
-        np.concatenate([part.tai_s for part in given]),
-        np.concatenate([part.az_deg for part in given]),
-        np.concatenate([part.el_deg for part in given]),
-    )
-    return RefitRequest(together, request.start_tai_s, request.horizon_s, request.now_tai_s, request.near_az_deg)
+    return replace(request, readings=Readings.joined(given))
 
 
 def _read(size: int) -> bytes:

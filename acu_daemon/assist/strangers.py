@@ -1,0 +1,54 @@
+"""Why readings that are off the path are off it: a side lobe, another satellite, or nobody knows.  Pure."""
+
+from math import hypot
+
+import numpy as np
+
+from acu_daemon.assist.gate import OFF_PATH, SIDE_LOBE, WRONG_TARGET
+from acu_daemon.assist.offsets import Flags, Offsets
+from acu_daemon.model import Readings
+
+SIDE_LOBE_BEAMS = (1.05, 2.2)  # around the 1.2 to 2 of a side lobe: noise and the path's own error
+LOW_DB = 3.0  # under the level kept before: a side lobe's
+LEVEL_S = 30.0
+NEWEST_S = 10.0
+DRIFT_BEAMS_S = 0.03  # a side lobe keeps its offset
+
+
+def is_beside(seen: Offsets, beamwidth_deg: float) -> Flags:
+    """Whether readings are as far off as a side lobe."""
+    beams = seen.angle_deg / beamwidth_deg
+    beside: Flags = (beams >= SIDE_LOBE_BEAMS[0]) & (beams <= SIDE_LOBE_BEAMS[1])
+    return beside
+
+
+def is_weak_beside(seen: Offsets, readings: Readings, kept: Readings, beamwidth_deg: float) -> Flags:
+    """Whether readings are a side lobe's by offset and level; none is where nobody knows the level."""
+    before_db = level_db(kept, LEVEL_S)
+    if readings.agc_db is None or before_db is None:
+        return np.zeros(len(readings), dtype=np.bool_)
+    weak: Flags = is_beside(seen, beamwidth_deg) & (readings.agc_db < before_db - LOW_DB)
+    return weak
+
+
+def level_db(readings: Readings, newest_s: float) -> float | None:
+    """The usual AGC of the newest readings; None where nobody knows."""
+    if len(readings) == 0 or readings.agc_db is None:
+        return None
+    newest = readings.agc_db[readings.tai_s >= readings.tai_s[-1] - newest_s]
+    return None if bool(np.all(np.isnan(newest))) else float(np.nanmedian(newest))
+
+
+def rise_db(kept: Readings, off: Readings) -> float | None:
+    """How much stronger the newest readings off the path are than those kept; None where nobody knows."""
+    before_db, now_db = level_db(kept, LEVEL_S), level_db(off, NEWEST_S)
+    return None if before_db is None or now_db is None else now_db - before_db
+
+
+def reason_of(seen: Offsets, rise: float | None, beamwidth_deg: float) -> str:
+    """The reason of readings off the path, oldest first, by the newest of them."""
+    if hypot(*seen.drift_deg_s(NEWEST_S)) > DRIFT_BEAMS_S * beamwidth_deg and seen.tai_s.size > 2:
+        return WRONG_TARGET
+    newest = seen.tai_s >= seen.tai_s[-1] - NEWEST_S
+    is_steady_beside = float(np.mean(is_beside(seen, beamwidth_deg)[newest])) > 0.5
+    return SIDE_LOBE if is_steady_beside and (rise is None or rise < -LOW_DB) else OFF_PATH
