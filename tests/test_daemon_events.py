@@ -132,9 +132,17 @@ def test_registers_are_within_a_tenth_of_a_degree_in_autotrack_after_ten_seconds
 
 
 def test_a_search_starts_only_after_hold_s() -> None:
-    target = demo_target(fallback={"hold_s": 20.0, "search_s": 30.0})
+    target = demo_target(fallback={"hold_s": 20.0, "search_s": 30.0}, tracking={"estimator": "kalman"})
     flight = climb(50.0, target, losses=[(12.0, 60.0)])
     assert seconds_to_state(flight, "SEARCH", T + 12.0) == pytest.approx(20.2, abs=0.2)
+
+
+def test_no_search_leaves_a_prediction_whose_three_sigma_are_within_the_beam() -> None:
+    target = demo_target(fallback={"hold_s": 5.0, "search_s": 30.0}, tracking={"estimator": "full"})
+    flight = climb(50.0, target, losses=[(25.0, 60.0)])
+    sure = [seen for seen in flight.snapshots if seen.state == "HOLD/FITTED" and seen.inside_s]
+    assert len(sure) > 200
+    assert seconds_to_state(flight, "SEARCH", T + 25.0) == float("inf")
 
 
 def test_a_search_finds_a_satellite_that_is_three_seconds_late() -> None:
