@@ -1,5 +1,6 @@
 """The command line itself: one typer app, and the exit status of every kind of failure."""
 
+import os
 import sys
 import traceback
 from typing import Annotated
@@ -73,6 +74,9 @@ def main() -> None:
         sys.exit(EXIT_FAILED)
     except KeyboardInterrupt:
         sys.exit(130)
+    except BrokenPipeError:  # whoever read our output has gone, such as `| head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        sys.exit(EXIT_FAILED)
     except Exception:  # noqa: BLE001  the last word of the program: an error of ours, with all we know
         traceback.print_exc()
         print("acu-daemon: internal error; please report the lines above", file=sys.stderr)  # noqa: T201

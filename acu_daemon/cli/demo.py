@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import structlog
 import typer
 
-from acu_daemon.cli.options import Target, coming_pass, load_target
+from acu_daemon.cli.options import STOP_SIGNALS, Target, coming_pass, load_target
 from acu_daemon.cli.run import make_job
 from acu_daemon.daemon.area import Snapshot
 from acu_daemon.daemon.live import LiveLine
@@ -26,7 +26,7 @@ from acu_daemon.edge.fit import ProcessFitRunner
 from acu_daemon.edge.link import make_link
 from acu_daemon.edge.logs import configure_logs
 from acu_daemon.edge.recording import RecordingWriter
-from acu_daemon.errors import AcuDaemonError
+from acu_daemon.errors import AcuDaemonError, UsageError
 from acu_daemon.model import sky_angle_deg
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 from acu_daemon.protocol.exchange import HostExchange
@@ -63,12 +63,21 @@ def command(
 
     Exit status: 0 the antenna was on the satellite at the end; 1 it was not.
     """
-    out.mkdir(parents=True, exist_ok=True)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"--out {out}: {error.strerror}; choose a directory that can be written") from None
     with tempfile.TemporaryDirectory(prefix="acu-daemon-demo-") as temporary:
         config = Path(temporary) / "config"
         with resources.as_file(resources.files("acu_daemon.cli") / "demo_config") as files:
             shutil.copytree(files, config)
-        asyncio.run(_demo(config, out))
+        try:
+            outcome = asyncio.run(_demo(config, out))
+        except ExceptionGroup as group:
+            raise group.exceptions[0] from None
+    if outcome.reason != "duration over":
+        typer.echo(f"stopped early ({outcome.reason}): no report")
+        raise typer.Exit(1)
     figures = _report(out)
     if not figures.is_on_satellite_at_end:
         raise typer.Exit(1)
@@ -123,12 +132,14 @@ async def _fake_acu(config: Path, at_monotonic_s: float, trace: Path) -> AsyncIt
         "fake-acu",
         *arguments,
         stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.DEVNULL,
+        stderr=asyncio.subprocess.PIPE,
+        start_new_session=True,  # a Ctrl-C is for the demo, which ends its children itself
     )
     try:
         line = (await process.stdout.readline()).decode() if process.stdout else ""
         if not line.startswith("listening "):
-            raise AcuDaemonError(f"the simulated ACU did not start: {line.strip() or 'it ended'}")
+            said = (await process.stderr.read()).decode().strip() if process.stderr else ""
+            raise AcuDaemonError(f"the simulated ACU did not start: {said or 'it ended'}")
         yield line.split()[1]
     finally:
         if process.returncode is None:
@@ -159,8 +170,8 @@ async def _assisted(config: Path, url: str, clock: SystemClock, sky: Sky, record
 
     with RecordingWriter(recording_path) as recording:
         service = Service(job, link, clock, ProcessFitRunner(job.refit), on_snapshot=show, on_reading=recording.add)
-        for number in (signal.SIGTERM, signal.SIGINT):
-            asyncio.get_running_loop().add_signal_handler(number, service.stop, "SIGTERM")
+        for number in STOP_SIGNALS:
+            asyncio.get_running_loop().add_signal_handler(number, service.stop, number.name)
         try:
             return await service.run()
         finally:

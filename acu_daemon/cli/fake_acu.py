@@ -2,14 +2,13 @@
 
 import asyncio
 import contextlib
-import signal
 import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from acu_daemon.cli.options import At, AtMonotonic, Config, Satellite, load_target, make_clock
+from acu_daemon.cli.options import STOP_SIGNALS, At, AtMonotonic, Config, Satellite, load_target, make_clock
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.link import BITS_PER_CHARACTER, DEFAULT_BAUD, make_link
 from acu_daemon.errors import UsageError
@@ -108,7 +107,7 @@ def _where(listen: str | None, pty: Path | None, url: str) -> tuple[str, int, Pa
 
 async def _serve(acu: FakeAcu, clock: SystemClock, host: str, port: int, pty: Path | None, baud: int) -> None:
     stopped = asyncio.Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
+    for number in STOP_SIGNALS:
         asyncio.get_running_loop().add_signal_handler(number, stopped.set)
     server = serve_pty(acu, clock, pty, baud) if pty is not None else serve_tcp(acu, clock, host, port)
     async with server as where:

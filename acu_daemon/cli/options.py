@@ -1,6 +1,7 @@
 """Options that several commands share, and what they are turned into."""
 
 import math
+import signal
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -20,6 +21,7 @@ from acu_daemon.pointing.keyhole import longest_window_s
 from acu_daemon.units import DAY_S
 
 NEXT_PASS_DAYS = 3.0
+STOP_SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)  # a closed terminal stops safely too
 SPARE_S = 30.0  # what a buffer and a fit look at beyond the times they are for, with some to spare
 
 Config = Annotated[
@@ -65,6 +67,12 @@ def make_clock(at: str | None, at_monotonic_s: float | None) -> SystemClock:
             raise UsageError("--at-monotonic needs --at: it says at which instant that time holds")
         return SystemClock()
     return SystemClock(parse_utc("--at", at), PROCESS_START_S if at_monotonic_s is None else at_monotonic_s)
+
+
+def check_duration(duration_s: float | None) -> None:
+    """UsageError: --duration is no time."""
+    if duration_s is not None and not 0.0 < duration_s < float("inf"):
+        raise UsageError(f"--duration {duration_s:g}: expected a number of seconds above 0")
 
 
 @dataclass(frozen=True, slots=True)

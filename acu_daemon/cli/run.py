@@ -4,7 +4,6 @@ import asyncio
 import contextlib
 import gc
 import math
-import signal
 import sys
 import time
 from dataclasses import asdict
@@ -18,7 +17,18 @@ import typer
 from acu_daemon import PROCESS_START_S
 from acu_daemon.assist.carry_over import CarryOver, carry_over_of, why_not
 from acu_daemon.assist.estimator import has_covariance
-from acu_daemon.cli.options import At, AtMonotonic, Config, Satellite, Target, coming_pass, load_target, make_clock
+from acu_daemon.cli.options import (
+    STOP_SIGNALS,
+    At,
+    AtMonotonic,
+    Config,
+    Satellite,
+    Target,
+    check_duration,
+    coming_pass,
+    load_target,
+    make_clock,
+)
 from acu_daemon.config import control_config, estimator_settings
 from acu_daemon.control.refit import RefitSetup
 from acu_daemon.daemon.area import Snapshot
@@ -62,6 +72,7 @@ def command(
 
     Exit status: 0 done; 1 the satellite was never acquired; 2 wrong use or configuration; 3 no ACU within 10 s.
     """
+    check_duration(duration)
     clock = make_clock(at, at_monotonic)
     target = load_target(config, satellite, clock.tai_s())
     coming = coming_pass(target, clock.tai_s())
@@ -73,7 +84,7 @@ def command(
     configure_logs(
         clock.tai_s,
         tags={"REHEARSAL": True} if clock.is_rehearsal else {},
-        is_terminal=sys.stdout.isatty(),
+        is_terminal=sys.stdout is not None and sys.stdout.isatty(),
         before_line=live.clear if live else None,
     )
     end_tai_s = math.inf if duration is None else clock.tai_s() + duration - (time.monotonic() - PROCESS_START_S)
@@ -84,7 +95,11 @@ def command(
     with RecordingWriter(record) if record is not None else contextlib.nullcontext() as recording:
         outcome = asyncio.run(_run(job, link, clock, live, recording, snapshots, _keeper(target, kept)))
     structlog.get_logger("run").info("run.done", **asdict(outcome))
-    if outcome.has_begun and not outcome.has_acquired and outcome.reason != "SIGTERM":
+    if (
+        outcome.has_begun
+        and not outcome.has_acquired
+        and outcome.reason not in {number.name for number in STOP_SIGNALS}
+    ):
         raise typer.Exit(1)
 
 
@@ -185,8 +200,8 @@ async def _run(
         keeper=keeper,
     )
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        loop.add_signal_handler(number, service.stop, "SIGTERM")
+    for number in STOP_SIGNALS:
+        loop.add_signal_handler(number, service.stop, number.name)
     gc.collect()
     gc.freeze()  # a full collection over the start-up heap would stall a tick by tens of milliseconds
     try:

@@ -101,6 +101,7 @@ class ProcessFitRunner:
             "acu_daemon.edge.fit",
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
+            start_new_session=True,  # a Ctrl-C is for the daemon, which ends the child itself
             limit=2**22,
         )
         self.start_count += 1

@@ -1,5 +1,6 @@
 """structlog: JSON lines to standard output for a service, readable lines for a terminal.  Changes, not ticks."""
 
+import contextlib
 import logging
 import sys
 from collections.abc import Callable, MutableMapping
@@ -42,11 +43,22 @@ def configure_logs(
     )
 
 
-class _OutputFactory:
-    """Loggers that print to standard output; the positional name becomes a field of every line."""
+class _Output:
+    """Prints lines to standard output.  A reader that went away, or a full disk, costs the line and never the pass."""
 
-    def __call__(self, *_names: Any) -> Any:
-        return structlog.PrintLogger(file=sys.stdout)
+    def msg(self, line: str) -> None:
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            sys.stdout.write(line + "\n")
+            sys.stdout.flush()
+
+    debug = info = warning = error = critical = msg
+
+
+class _OutputFactory:
+    """Makes the one output; the names that loggers are asked for are not printed."""
+
+    def __call__(self, *_names: Any) -> _Output:
+        return _Output()
 
 
 def _readable(level: str, entry: Entry) -> str:

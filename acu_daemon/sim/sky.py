@@ -75,7 +75,7 @@ def read_truth(path: Path) -> DirectionTable:
     """Read a truth CSV (design section 8).  UsageError: names file and line."""
     rows: list[tuple[float, float, float, float]] = []
     try:
-        file = path.open(newline="")
+        file = path.open(newline="", encoding="utf-8", errors="replace")
     except OSError as error:
         raise UsageError(f"--truth {path}: {error.strerror}") from None
     with file:
