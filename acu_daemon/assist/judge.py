@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from acu_daemon.assist.full import FullEstimator
-from acu_daemon.assist.full_states import BROUWER_SIGMAS
+from acu_daemon.assist.full_states import BROUWER_SIGMAS, make_prior, states_of
 from acu_daemon.assist.offsets import Offsets, offsets
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings, StateSigmas
 from acu_daemon.errors import OrbitError
@@ -65,3 +65,22 @@ class Judge:
         if before is not None and float(np.mean(old.is_near[old.tai_s >= old.tai_s[-1] - PAST_S])) < NEAR_SHARE:
             return None
         return new
+
+    def strain(self, readings: Readings) -> float:
+        """How far the orbit and the biases that fit readings are from what the elements say: sigmas, squared, summed.
+
+        Infinite where the most likely orbit does not go through them.
+        Raises:  OrbitError: the source has no answer for one of the times.
+        """
+        estimator = FullEstimator(self._source, self._site, self._settings)
+        estimator.add(readings)
+        fit = estimator.fit()
+        if fit is None:
+            return 0.0
+        seen = offsets(self._source, self._site, replace(fit, covariance=None), readings, self._settings)
+        if float(np.mean(seen.is_near)) < NEAR_SHARE:
+            return np.inf
+        x = states_of(fit.correction, fit.bias, fit.station_shift_enu_m)
+        variance = np.diag(make_prior(self._source, self._settings, float(readings.tai_s[0])).covariance)
+        is_open = variance > 0.0
+        return float(np.sum(x[is_open] ** 2 / variance[is_open]))

@@ -52,3 +52,14 @@ def reason_of(seen: Offsets, rise: float | None, beamwidth_deg: float) -> str:
     newest = seen.tai_s >= seen.tai_s[-1] - NEWEST_S
     is_steady_beside = float(np.mean(is_beside(seen, beamwidth_deg)[newest])) > 0.5
     return SIDE_LOBE if is_steady_beside and (rise is None or rise < -LOW_DB) else OFF_PATH
+
+
+def left_path_tai_s(seen: Offsets, longest_s: float) -> float:
+    """When a track that drifts was on the path: its offset traced back to zero, by longest_s at most."""
+    right, up = seen.drift_deg_s(NEWEST_S)
+    first_tai_s = float(seen.tai_s[0])
+    speed2 = right * right + up * up
+    if speed2 == 0.0:
+        return first_tai_s - longest_s
+    back_s = float(seen.right_deg[0] * right + seen.up_deg[0] * up) / speed2
+    return first_tai_s - min(max(back_s, 0.0), longest_s)

@@ -17,7 +17,8 @@ from acu_daemon.assist.gate import ACCELERATION, BELIED, OFF_PATH, WRONG_TARGET,
 from acu_daemon.assist.judge import Judge
 from acu_daemon.assist.offsets import Offsets, offsets
 from acu_daemon.assist.settings import EstimatorSettings
-from acu_daemon.assist.strangers import LOW_DB, is_weak_beside, reason_of, rise_db
+from acu_daemon.assist.spans import seconds, span_s, tail_of
+from acu_daemon.assist.strangers import LOW_DB, is_weak_beside, left_path_tai_s, reason_of, rise_db
 from acu_daemon.model import FitResult, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
 
@@ -25,14 +26,18 @@ JUMP_BEAMS = 0.5  # a track that left the path by such a step was never on it
 BREAK_S = 3.0  # between readings: nobody saw what happened
 SUSTAINED_S = 0.9
 TAIL_S = 10.0  # the newest of the waiting readings, which must lie on one orbit with those kept
-LONGEST_TAKEN_BACK_S = 8.0
+TAKEN_BACK_S = 10.0
+CLEAR_S = 4.0  # off the path for so long, a track shows when it left
+JUDGED_S = 120.0  # so much of the kept readings is enough to judge others
 YOUNG_S = 20.0  # a fit to less may have been another satellite's from the first reading on
 FIRST_TRIAL_S, LAST_TRIAL_S = 8.0, 64.0  # once readings were no orbit's: how long the next ones must be one's
 NARROW, WIDE = 3.0, 30.0  # how much room the elements are given, by the sigmas
 WIDE_AFTER_S = 20.0
-RESET_S = (10.0, 90.0)  # at least, at most; between them RESET_SHARE times what was kept
+RESET_S = (10.0, 75.0)  # at least, at most; between them RESET_SHARE times what was kept
 RESET_SHARE = 3.0
+RESET_EVERY_S = 4.0
 HIGH_DB = 6.0  # over the level kept before: what was kept was the side lobe
+STRAIN, STRAIN_S = 20.0, 30.0  # sigmas squared by which an orbit is much less likely than another; seen over
 WAITING_S = 200.0
 _NONE = Readings.of([])
 
@@ -62,7 +67,8 @@ class TrackGate:
         self._kept: list[Readings] = []
         self._waiting = _NONE
         self._waiting_reason = ""
-        self._is_taken_back = False
+        self._taken_back: Readings | None = None  # kept before, until it is clear when the track left the path
+        self._reset_tai_s = -np.inf  # when a reset was considered last
         self._trial_s = 0.0
         self._left_out: Counter[str] = Counter()
         self.rejecting = ""
@@ -79,7 +85,8 @@ class TrackGate:
     @property
     def counts(self) -> dict[str, int]:
         """Readings left out, by reason."""
-        return dict(self._left_out + Counter({self._waiting_reason: len(self._waiting)}))
+        waiting_count = len(self._waiting) + len(self._taken_back or _NONE)
+        return dict(self._left_out + Counter({self._waiting_reason: waiting_count}))
 
     def restart(self, newest_s: float) -> None:
         """Believe only the newest readings."""
@@ -124,7 +131,7 @@ class TrackGate:
 
     def _end_waiting(self) -> None:
         self._leave_out(self._waiting, self._waiting_reason)
-        self._waiting, self._waiting_reason, self._is_taken_back = _NONE, "", False
+        self._waiting, self._waiting_reason, self._taken_back = _NONE, "", None
 
     def _believe(self, questioned: Readings, seen: Offsets) -> Taken:
         """Keep those of the questioned readings, the newest that wait, that are near; all others are left out."""
@@ -144,8 +151,8 @@ class TrackGate:
         if self._trial_s:
             trials.append((max(WIDE_AFTER_S, self._trial_s), WIDE))
         for trial_s, factor in trials:
-            tail = _tail(self._waiting, trial_s or WAITING_S)
-            if _span_s(self._waiting) >= trial_s and (seen := self._judge.verdict(None, tail, factor)) is not None:
+            tail = tail_of(self._waiting, trial_s or WAITING_S)
+            if span_s(self._waiting) >= trial_s and (seen := self._judge.verdict(None, tail, factor)) is not None:
                 self._waiting_reason = WRONG_TARGET
                 return self._believe(tail, seen)
         self._trial_s = max(self._trial_s, FIRST_TRIAL_S)
@@ -156,58 +163,78 @@ class TrackGate:
         if len(near):
             self._kept.append(near)
         if len(off) <= len(near):
+            is_rebuilt = len(near) > 0 and self._give_back(fit)
             if len(near):  # back on the path, or single wild readings
                 self._end_waiting()
             self._leave_out(off, OFF_PATH)
-            return Taken(near)
+            return Taken(near, is_rebuilt)
         self._wait(off)
         seen = self._offsets(self._waiting, fit)
         self._waiting_reason = reason_of(seen, rise_db(self.kept, off), self._settings.beamwidth_deg)
         is_rebuilt = False
-        if _span_s(self._waiting) >= SUSTAINED_S and not self._is_taken_back:
-            self._is_taken_back = True
+        off_s = span_s(self._waiting)
+        if self._taken_back is None and off_s >= SUSTAINED_S:
+            self._taken_back = _NONE
             is_rebuilt = self._take_back(seen, fit)
             if not self._kept:
                 self._first(_NONE)
                 return Taken(is_rebuilt=True)
-        tail = _tail(self._waiting, TAIL_S)
-        if (judged := self._judge.verdict(self.kept, tail, NARROW)) is not None:
+        elif off_s >= CLEAR_S:
+            is_rebuilt = self._give_back(fit)
+        tail = tail_of(self._waiting, TAIL_S)
+        if (judged := self._judge.verdict(tail_of(self.kept, JUDGED_S), tail, NARROW)) is not None:
             return self._believe(tail, judged)
-        if self._resets():
-            return Taken(is_rebuilt=True)
-        return Taken(is_rebuilt=True) if is_rebuilt else Taken(near)
+        return Taken(near, is_rebuilt or self._resets())
 
     def _take_back(self, seen: Offsets, fit: FitResult) -> bool:
-        """Let a track that left the path without a jump take with it what was kept since it left."""
+        """Take what was kept last from a track that left the path without a jump: it was on its way already."""
         kept = self.kept
         last = self._offsets(kept.part(slice(-1, None)), fit)
         step_deg = np.array([seen.right_deg[0] - last.right_deg[0], seen.up_deg[0] - last.up_deg[0]])
         is_jump = float(np.hypot(*step_deg)) > JUMP_BEAMS * self._settings.beamwidth_deg
         if is_jump or seen.tai_s[0] - last.tai_s[0] > BREAK_S:
             return False
-        left_tai_s = _left_path_tai_s(seen)
-        if _seconds(kept) < YOUNG_S:
-            left_tai_s = -np.inf
+        if seconds(kept) < YOUNG_S:
             self._trial_s = min(max(FIRST_TRIAL_S, 2.0 * self._trial_s), LAST_TRIAL_S)
-        is_back = kept.tai_s >= left_tai_s
-        if not is_back.any():
+            self._waiting = Readings.joined([kept, self._waiting])
+            self._kept = []
+            return True
+        is_back = kept.tai_s > kept.tai_s[-1] - TAKEN_BACK_S
+        self._taken_back = kept.part(is_back)
+        self._kept = [kept.part(~is_back)]
+        return True
+
+    def _give_back(self, fit: FitResult) -> bool:
+        """Keep again what was taken back from before the track left the path."""
+        if self._taken_back is None or len(self._taken_back) == 0:
             return False
-        self._waiting = Readings.joined([kept.part(is_back), self._waiting])
-        self._kept = [] if bool(is_back.all()) else [kept.part(~is_back)]
+        is_good = self._taken_back.tai_s < left_path_tai_s(self._offsets(self._waiting, fit), TAKEN_BACK_S)
+        self._waiting = Readings.joined([self._taken_back.part(~is_good), self._waiting])
+        self._kept = [
+            self.kept.part(self.kept.tai_s < self._taken_back.tai_s[0]),
+            self._taken_back.part(is_good),
+            self.kept.part(self.kept.tai_s > self._taken_back.tai_s[-1]),
+        ]
+        self._taken_back = _NONE
         return True
 
     def _resets(self) -> bool:
         """Whether the waiting readings alone obeyed an orbit for so long that the kept ones are what is wrong."""
         least_s, most_s = RESET_S
-        needed_s = min(max(RESET_SHARE * _seconds(self.kept), least_s), most_s)
-        rise = rise_db(self.kept, self._waiting) or 0.0
-        if rise > HIGH_DB:
-            needed_s = least_s
-        elif rise < -LOW_DB:
-            needed_s *= 2.0
-        if _span_s(self._waiting) < needed_s:
+        if self._waiting.tai_s[-1] < self._reset_tai_s + RESET_EVERY_S:
             return False
-        tail = _tail(self._waiting, needed_s)
+        self._reset_tai_s = float(self._waiting.tai_s[-1])
+        needed_s = min(max(RESET_SHARE * seconds(self.kept), least_s), most_s)
+        if span_s(self._waiting) < least_s:
+            return False
+        rise = rise_db(self.kept, self._waiting)
+        if (rise is None and self._are_kept_strained()) or (rise is not None and rise > HIGH_DB):
+            needed_s = least_s
+        elif rise is not None and rise < -LOW_DB:
+            needed_s *= 2.0
+        if span_s(self._waiting) < needed_s:
+            return False
+        tail = tail_of(self._waiting, needed_s)
         judged = self._judge.verdict(None, tail, NARROW)
         if judged is None:
             return False
@@ -217,26 +244,7 @@ class TrackGate:
         self._believe(tail, judged)
         return True
 
-
-def _left_path_tai_s(seen: Offsets) -> float:
-    """When a track that drifts was on the path: its offset traced back to zero."""
-    right, up = seen.drift_deg_s(TAIL_S)
-    first_tai_s = float(seen.tai_s[0])
-    speed2 = right * right + up * up
-    if speed2 == 0.0:
-        return first_tai_s - LONGEST_TAKEN_BACK_S
-    back_s = float(seen.right_deg[0] * right + seen.up_deg[0] * up) / speed2
-    return first_tai_s - min(max(back_s, 0.0), LONGEST_TAKEN_BACK_S)
-
-
-def _tail(readings: Readings, newest_s: float) -> Readings:
-    return readings.part(readings.tai_s >= readings.tai_s[-1] - newest_s - 1e-6)
-
-
-def _span_s(readings: Readings) -> float:
-    return float(readings.tai_s[-1] - readings.tai_s[0]) if len(readings) else 0.0
-
-
-def _seconds(readings: Readings) -> int:
-    """Seconds in which there is a reading."""
-    return int(np.unique(np.floor(readings.tai_s)).size)
+    def _are_kept_strained(self) -> bool:
+        """Whether the orbit through the kept readings is much less likely than the one through those that wait."""
+        of_kept, of_waiting = (self._judge.strain(tail_of(one, STRAIN_S)) for one in (self.kept, self._waiting))
+        return of_kept - STRAIN > of_waiting
