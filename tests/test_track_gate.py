@@ -154,7 +154,7 @@ def test_a_bad_minute_leaves_the_prediction_where_it_was_and_says_why(kind: str)
 
 @pytest.mark.parametrize("estimator", ["kalman", "deterministic"])
 def test_the_gate_serves_every_estimator(estimator: str) -> None:
-    readings = _stranger(_good(2.0), -0.2, 0.1)
+    readings = _stranger(_good(1.0), -0.2, 0.1)
     setup = _setup(estimator=estimator)
     ahead_tai_s = readings.tai_s[-1] + np.arange(0.0, 60.0, 5.0)
     spoilt = _feed(setup, readings)[-1]
@@ -168,10 +168,10 @@ def test_while_an_axis_accelerates_near_its_limit_readings_are_left_out() -> Non
         SIGMA_DEG, SIGMA_DEG, azimuth=AxisLimits(-270.0, 270.0, 20.0, 0.05), elevation=ELEVATION
     )
     setup = RefitSetup(SOURCE, site(1.0, 3.0), "full", settings, AZIMUTH)
-    tai_s = visible(TRUTH, setup.site, 2.0, 30.0)
+    tai_s = visible(TRUTH, setup.site, 4.0, 30.0)
     seen = look_at(TRUTH, tai_s, setup.site)
     is_hard = np.abs(np.gradient(seen.az_rate_deg_s, tai_s)) > 0.02
-    assert 10 < np.count_nonzero(is_hard) < tai_s.size / 2
+    assert 5 < np.count_nonzero(is_hard) < tai_s.size / 2
     lagging = noisy((seen.az_deg + 0.6 * is_hard) % 360.0, seen.el_deg, tai_s, SIGMA_DEG, np.random.default_rng(3))
     last = _feed(setup, lagging)[-1]
     assert last.gate.counts[ACCELERATION] >= np.count_nonzero(is_hard)
@@ -267,20 +267,27 @@ def _real(a_pass, tai_s, bias_deg=(0.0, 0.0)) -> Readings:
 @pytest.mark.parametrize("bias_deg", [(0.0, 0.0), (0.05, -0.04)])
 @pytest.mark.parametrize("name", real_passes.names())
 def test_nothing_good_is_left_out_on_clean_real_passes(name: str, bias_deg) -> None:
-    """The whole pass, one reading in 8 s, and 20 s of it at 10 Hz."""
+    """The whole pass, one reading in 15 s, and 10 s of it at 10 Hz."""
     a_pass = real_passes.load(name)
     first, last = a_pass.tai_s[0], a_pass.tai_s[-1]
-    for tai_s in (np.arange(first, last, 8.0), (first + last) / 2 + np.arange(-150.0, -130.0, 0.1)):
+    for tai_s in (np.arange(first, last, 15.0), (first + last) / 2 + np.arange(-150.0, -140.0, 0.1)):
         reply = _feed(
-            _real_setup(a_pass), _real(a_pass, tai_s, bias_deg), batch_s=8.0 if tai_s[1] - tai_s[0] > 1 else 1.0
+            _real_setup(a_pass), _real(a_pass, tai_s, bias_deg), batch_s=15.0 if tai_s[1] - tai_s[0] > 1 else 1.0
         )[-1]
         bad_count = sum(n for reason, n in reply.gate.counts.items() if reason != ABOVE_MAX_ELEVATION)
         assert bad_count < 0.01 * tai_s.size
 
 
 @needs_data
-@pytest.mark.parametrize("kind", ["side lobe across", "drawn away slowly", "drawn away", "jumps"])
-@pytest.mark.parametrize("name", ["iss-2022-Huntsville-20220211T2156", "sentinel-3a-CachoeiraPaulista-20181225T0140"])
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("iss-2022-Huntsville-20220211T2156", "drawn away slowly"),
+        ("iss-2022-Huntsville-20220211T2156", "side lobe along"),
+        ("sentinel-3a-CachoeiraPaulista-20181225T0140", "drawn away"),
+        ("sentinel-3a-CachoeiraPaulista-20181225T0140", "jumps"),
+    ],
+)
 def test_on_a_real_pass_a_bad_minute_leaves_the_prediction_where_it_was(name: str, kind: str) -> None:
     a_pass = real_passes.load(name)
     setup, (reason, spoil) = _real_setup(a_pass), BAD_MINUTES[kind]

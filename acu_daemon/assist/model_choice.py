@@ -4,7 +4,7 @@ The newest locked residuals decide; a new fit that is bad three times in a row s
 GD 7200, reference/field.md).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -61,4 +61,5 @@ def newest_residual_deg(
     Raises:  OrbitError: the source has no answer for one of the times.
     """
     newest = readings.part(readings.tai_s >= readings.tai_s[-1] - NEWEST_S)
-    return float(np.median(offsets(source, site, fit, newest, settings).angle_deg))
+    model = None if fit is None else replace(fit, covariance=None)  # its sigma is of no use here, and slow
+    return float(np.median(offsets(source, site, model, newest, settings).angle_deg))
