@@ -15,11 +15,11 @@ from acu_daemon.control.states import AUTOTRACKING
 from acu_daemon.control.tick import tick
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.port import AcuPort, Answer
+from acu_daemon.daemon.stopping import stop_antenna
 from acu_daemon.edge.clock import Clock
 from acu_daemon.model import Reading
 from acu_daemon.protocol.messages import (
     Ack,
-    AcuMode,
     Command,
     Faults,
     Identity,
@@ -28,7 +28,6 @@ from acu_daemon.protocol.messages import (
     SelectBackup,
     SelectMode,
     Status,
-    Stop,
     WriteAndPoll,
     WriteParameter,
     WriteRegisters,
@@ -37,7 +36,6 @@ from acu_daemon.protocol.messages import (
 
 CLOCK_STEP_S = 0.1
 LATENESS_KEPT = 36000  # an hour of ticks
-NO_STOP_MODES = (AcuMode.MANUAL, AcuMode.STOWING, AcuMode.STOWED, AcuMode.FAULT)  # a stop would disturb, or do nothing
 
 
 class Foreground:
@@ -180,22 +178,6 @@ class Foreground:
                 self._log.info("clock.back", difference_s=round(self.clock_difference_s, 4))
 
     async def safe_stop(self) -> bool:
-        """Stop the antenna, unless it never obeyed us or somebody else moves it.  True: stopped, or nothing to stop."""
+        """Stop the antenna, unless it never obeyed us.  True: stopped, or nothing to stop."""
         status = self._area.state.status
-        if self.write_count == 0 or status is None:
-            return True
-        if status.mode in NO_STOP_MODES or not status.is_remote_enabled:
-            self._log.info("stop.left_alone", mode=status.mode.name)
-            return True
-        for _ in range(5):
-            if self._port.must_poll:
-                await self._port.exchange(Poll())
-                await self._port.idle_gap()
-                continue
-            answer = await self._port.exchange(Stop())
-            if isinstance(answer.reply, Ack):
-                self._log.info("stop.done")
-                return True
-            await self._port.idle_gap()
-        self._log.warning("stop.unconfirmed", advice="the antenna may still follow its registers: look at the ACU")
-        return False
+        return self.write_count == 0 or status is None or await stop_antenna(self._port, status)
