@@ -16,6 +16,7 @@ from acu_daemon.protocol.messages import AcuMode, Status
 CONFIG = ControlConfig(AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0))
 DT_S = 0.1
 RATE_TOLERANCE_DEG = 0.006  # one 16-bit code
+CHASE_S = 5.0  # is enough for 3 degrees, at any rate of the path here
 
 any_angle = st.floats(allow_nan=True, allow_infinity=True) | st.floats(-400, 400)
 
@@ -80,3 +81,16 @@ def test_a_path_the_axis_can_follow_passes_unchanged():
     passed = gate(Pointing(100.05, 45.03, 0.5, 0.3), state, 0.0, is_followed=True, dt_s=DT_S, config=CONFIG)
     assert not passed.is_held_back
     assert passed.az.position_deg == pytest.approx(100.05, abs=RATE_TOLERANCE_DEG / 2)
+
+
+@pytest.mark.parametrize("el_deg", [10.0, 40.0, 60.0, 75.0, 85.0])
+@pytest.mark.parametrize("rate_deg_s", [-4.0, -1.0, 0.5, 1.0, 2.0, 4.0])
+def test_registers_that_begin_beside_a_moving_path_come_onto_it_and_not_only_to_the_edge_of_the_beam(
+    el_deg: float, rate_deg_s: float
+) -> None:
+    state = at(100.0, el_deg)
+    for tick in range(1, 1 + round(CHASE_S / DT_S)):
+        path = Pointing(103.0 + rate_deg_s * DT_S * tick, el_deg, rate_deg_s, 0.0)
+        passed = gate(path, state, 0.0, is_followed=True, dt_s=DT_S, config=CONFIG)
+        state = replace(at(passed.az.position_deg, passed.el.position_deg), axis_az=passed.az, axis_el=passed.el)
+    assert passed.az.position_deg == pytest.approx(path.az_deg, abs=RATE_TOLERANCE_DEG)

@@ -121,7 +121,7 @@ def _reachable(start: AxisState, wanted: AxisState, dt_s: float, limits: AxisLim
     is_near = abs(reached.position_deg - wanted.position_deg) < NEAR_DEG
     if is_near and abs(reached.rate_deg_s - wanted.rate_deg_s) < NEAR_DEG_S:
         return reached
-    gap_deg = wanted.position_deg - start.position_deg
+    gap_deg = wanted.position_deg - wanted.rate_deg_s * dt_s - start.position_deg  # both at the start of the step
     is_leaving = (start.rate_deg_s - wanted.rate_deg_s) * gap_deg < 0.0
     chase = _share(limits, CHASE_RATE_MARGIN, PATH_MARGIN if is_leaving else CHASE_ACCELERATION_MARGIN)
     aim_deg = wanted.position_deg
