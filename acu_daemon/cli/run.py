@@ -32,6 +32,7 @@ from acu_daemon.cli.options import (
 from acu_daemon.config import control_config, estimator_settings
 from acu_daemon.control.refit import RefitSetup
 from acu_daemon.daemon.area import Snapshot
+from acu_daemon.daemon.health import Health
 from acu_daemon.daemon.live import LiveLine
 from acu_daemon.daemon.service import Outcome, PassJob, Service
 from acu_daemon.edge.carry_over import FitKeeper, carry_over_path, read_carry_over
@@ -41,6 +42,7 @@ from acu_daemon.edge.link import Link, check_rate, make_link
 from acu_daemon.edge.logs import configure_logs
 from acu_daemon.edge.recording import RecordingWriter
 from acu_daemon.edge.state import SnapshotFile, state_directory
+from acu_daemon.edge.systemd import Notifier
 from acu_daemon.model import Pass
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.protocol.sa3842 import address_byte
@@ -185,7 +187,11 @@ async def _run(
     snapshots: SnapshotFile,
     keeper: FitKeeper,
 ) -> Outcome:
+    notifier = Notifier()
+    health = Health(notifier)
+
     def show(seen: Snapshot) -> None:
+        health.see(seen)
         snapshots.write(asdict(seen))
         if live is not None:
             live.show(seen)
@@ -207,6 +213,7 @@ async def _run(
     try:
         return await service.run()
     finally:
+        notifier.close()
         if live is not None:
             live.clear()
         clock.close()

@@ -65,6 +65,8 @@ class Snapshot:
     link_problem: str
     is_rehearsal: bool
     is_simulation: bool
+    answered_count: int = 0  # ordered exchanges that the ACU answered
+    attempt_count: int = 0  # to open the link
     model: str = ""  # what the prediction is made from
     rejecting: str = ""  # why the newest readings are not fitted
     rejected_counts: dict[str, int] = field(default_factory=dict)  # readings so far, by reason

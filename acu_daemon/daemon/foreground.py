@@ -63,6 +63,7 @@ class Foreground:
         self.identity: Identity | None = None
         self.tick_count = 0
         self.write_count = 0
+        self.answered_count = 0  # ordered exchanges that were answered: the work that the watchdog asks for
         self.skipped_tick_count = 0
         self.clock_difference_s = 0.0
         self._is_clock_stepped = False
@@ -99,7 +100,8 @@ class Foreground:
         self._seen = Observation()
         if not port.is_up:
             return
-        await self._do(orders.first)
+        is_answered = await self._do(orders.first)
+        self.answered_count += is_answered and not seen.must_poll  # a poll after a failure is no progress
         if orders.extra is not None and port.is_up and not port.must_poll:
             await port.idle_gap()
             await self._do(orders.extra)
@@ -107,8 +109,11 @@ class Foreground:
     def _silence_s(self) -> float:
         return self._port.silence_s if self._port.is_up else math.inf
 
-    async def _do(self, command: Command) -> None:
-        """One exchange; what it brings is gathered for the next decision.  A NAK is followed by a poll at once."""
+    async def _do(self, command: Command) -> bool:
+        """One exchange; what it brings is gathered for the next decision.  A NAK is followed by a poll at once.
+
+        True: a reply came, be it a refusal.
+        """
         answer = await self._port.exchange(command)
         if isinstance(command, WriteAndPoll) and isinstance(answer.reply, Status):
             self.write_count += 1
@@ -123,6 +128,7 @@ class Foreground:
             self._report_extra(command, answer)
             if isinstance(answer.reply, Nak):
                 await self._poll_after_nak(command)
+        return answer.reply is not None
 
     async def _poll_after_nak(self, refused: Command) -> None:
         self._log.warning("acu.nak", command=command_text(refused))

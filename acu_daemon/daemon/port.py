@@ -46,6 +46,7 @@ class AcuPort:
         self.problem = ""
         self.last_reply_s = clock.monotonic_s()
         self.connect_count = 0
+        self.attempt_count = 0  # to open the link, begun or failed
         self.failed_exchange_count = 0
 
     @property
@@ -129,6 +130,7 @@ class AcuPort:
         reported = ""
         try:
             while True:
+                self.attempt_count += 1
                 try:
                     await self._link.open()
                     await self._first_poll()
@@ -137,6 +139,7 @@ class AcuPort:
                         reported = str(error)
                         self._log.warning("link.closed", link=self._link.description, reason=reported)
                     self.problem = str(error)
+                    self.attempt_count += 1
                     await self._link.close()
                     await asyncio.sleep(pause_s)
                     pause_s = min(2 * pause_s, LAST_BACK_OFF_S)

@@ -246,6 +246,8 @@ class Service:
             tick_count=self._foreground.tick_count,
             skipped_tick_count=self._foreground.skipped_tick_count,
             write_count=self._foreground.write_count,
+            answered_count=self._foreground.answered_count,
+            attempt_count=self._port.attempt_count,
             refusal_count=state.gate_refusal_count,
             is_link_up=self._port.is_up,
             link_problem=self._port.problem,

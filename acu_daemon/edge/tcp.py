@@ -9,7 +9,7 @@ from collections.abc import Callable
 from acu_daemon.edge.arrivals import Arrivals
 from acu_daemon.errors import LinkError, LinkRefusedError
 
-CONNECT_TIMEOUT_S = 2.0
+CONNECT_TIMEOUT_S = 1.0  # with the back-off still well inside the service's watchdog
 _DROP_UNSENT = struct.pack("ii", 1, 0)  # SO_LINGER on, 0 s: close() throws away what has not arrived
 
 

@@ -1,0 +1,29 @@
+"""What systemd is told and asks: readiness, watchdog and one line of status (sd_notify(3), sd_watchdog_enabled(3))."""
+
+import os
+import socket
+from collections.abc import Mapping
+
+
+class Notifier:
+    """Sends datagrams to $NOTIFY_SOCKET; without one, and where it cannot be reached, nothing happens."""
+
+    def __init__(self, environment: Mapping[str, str] = os.environ) -> None:
+        address = environment.get("NOTIFY_SOCKET", "")
+        self._address = "\0" + address[1:] if address.startswith("@") else address  # '@': an abstract name
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) if address else None
+        if self._socket is not None:
+            self._socket.setblocking(False)
+
+    def __call__(self, text: str) -> None:
+        """Send assignments such as "READY=1", one a line.  Never blocks, never fails."""
+        if self._socket is None:
+            return
+        try:
+            self._socket.sendto(text.encode(), self._address)
+        except OSError:
+            return
+
+    def close(self) -> None:
+        if self._socket is not None:
+            self._socket.close()
