@@ -15,6 +15,7 @@ from acu_daemon.orbit.brouwer import BrouwerPropagator
 from acu_daemon.orbit.timescales import gmst_rad, tai_from_utc
 from acu_daemon.protocol.messages import Command, SelectBackup, SelectMode, WriteAndPoll, WriteParameter, WriteRegisters
 from acu_daemon.sim.build import make_sky
+from acu_daemon.sim.fault_verbs import parse_fault
 from acu_daemon.sim.scenario import AcuChoice, Encoder, Loss, Scenario, SkyErrors
 from acu_daemon.sim.sky import Sky
 from acu_daemon.sim.trace import TraceRow
@@ -72,17 +73,19 @@ def flight_of(
     antenna: AcuChoice,
     losses: Iterable[tuple[float, float]] = (),
     script: Script = (),
+    faults: Iterable[str] = (),
     errors: SkyErrors = WRONG_ORBIT,
     noise_deg: float = NOISE_DEG,
     sky: Sky | None = None,
     **parts: Any,
 ) -> Flight:
-    """Fly; losses and script in seconds from the beginning."""
+    """Fly; losses, script and faults (as for a control port) in seconds from the beginning."""
     scenario = Scenario(
         sky=errors,
         encoder=Encoder(noise_deg=noise_deg),
         acu=antenna,
         losses=tuple(loss(begin_tai_s + a, begin_tai_s + b) for a, b in losses),
+        faults=tuple(map(parse_fault, faults)),
     )
     return fly(
         target,

@@ -20,6 +20,8 @@ from acu_daemon.edge.fit import FitRunner, InlineFitRunner
 from acu_daemon.protocol.messages import Command
 from acu_daemon.protocol.sa3842 import CommandDecoder, address_byte
 from acu_daemon.sim.acu import FakeAcu
+from acu_daemon.sim.acu_faults import break_acu
+from acu_daemon.sim.fault_board import FaultBoard
 from acu_daemon.sim.memory import MemoryLink
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.scenario import Scenario
@@ -53,6 +55,7 @@ class Stage:
     link: MemoryLink
     clock: LoopClock
     service: Service
+    board: FaultBoard
 
 
 Action = Callable[[Stage], None]
@@ -61,8 +64,10 @@ Action = Callable[[Stage], None]
 class _TappedLink(MemoryLink):
     """A memory link that notes every command."""
 
-    def __init__(self, acu: FakeAcu, clock: LoopClock, byte_time_s: float, address: int, flight: Flight) -> None:
-        super().__init__(acu, clock, byte_time_s)
+    def __init__(
+        self, acu: FakeAcu, clock: LoopClock, byte_time_s: float, address: int, flight: Flight, board: FaultBoard
+    ) -> None:
+        super().__init__(acu, clock, byte_time_s, board)
         self._tap = CommandDecoder(address, math.inf)
         self._tap_clock = clock
         self._flight = flight
@@ -113,12 +118,14 @@ def fly(
         acu = make_acu(parts)
         acu.observer = flight.rows.append
         acu.on_write = flight.writes.append
-        link = _TappedLink(acu, clock, byte_time_s, parts.address, flight)
+        board = FaultBoard(scenario.faults)
+        break_acu(acu, board, clock)
+        link = _TappedLink(acu, clock, byte_time_s, parts.address, flight, board)
         job = make_job(target, coming_pass(target, begin_tai_s), link, is_rehearsal=True, end_tai_s=end_tai_s)
         service = Service(job, link, clock, make_runner(job.refit), on_snapshot=flight.snapshots.append)
         loop = asyncio.get_running_loop()
         for tai_s, action in script:
-            loop.call_later(tai_s - begin_tai_s, action, Stage(acu, link, clock, service))
+            loop.call_later(tai_s - begin_tai_s, action, Stage(acu, link, clock, service, board))
         flight.outcome = await service.run()
         acu.advance(clock.tai_s())
 

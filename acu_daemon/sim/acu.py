@@ -60,6 +60,7 @@ class FakeAcu:
         self.observer: Callable[[TraceRow], None] | None = None
         self.on_write: Callable[[RegisterWrite], None] | None = None
         self._has_tilt = parts.scenario.acu.has_tilt
+        self.is_powered = True
         self._antenna = Antenna(parts)
         self._tick = 0
         self._part_s = 0.0
@@ -82,8 +83,19 @@ class FakeAcu:
 
     def power_cycle(self, now_tai_s: float) -> None:
         """Switch off and on: everything but the antenna's position is forgotten."""
+        self.power_off(now_tai_s)
+        self.power_on(now_tai_s)
+
+    def power_off(self, now_tai_s: float) -> None:
+        """The antenna stands, and nobody answers."""
         self.advance(now_tai_s)
         self._antenna.lose_power()
+        self.is_powered = False
+
+    def power_on(self, now_tai_s: float) -> None:
+        """Start anew."""
+        self.advance(now_tai_s)
+        self.is_powered = True
         self._power_up(is_local=not self._modes.is_remote_enabled)
 
     def set_local(self, is_local: bool, now_tai_s: float) -> None:
@@ -101,6 +113,11 @@ class FakeAcu:
         """Mend it."""
         self.advance(now_tai_s)
         self._faults.end(nibble, bit)
+
+    @property
+    def antenna(self) -> Antenna:
+        """What moves and hears, to break it."""
+        return self._antenna
 
     @property
     def _now_s(self) -> float:
@@ -271,16 +288,21 @@ class FakeAcu:
         self._part_s = min(max(since_start_s - self._now_s, 0.0), STEP_S)
 
     def _step(self) -> None:
-        modes, antenna, now_s = self._modes, self._antenna, self._now_s
+        antenna, now_s = self._antenna, self._now_s
         antenna.move_and_sense(self._tai_s, self._parameters.threshold_db)
+        if self.is_powered:
+            self._serve(now_s)
+        if self.observer is not None and self._tick % TRACE_STEPS == 0:
+            self.observer(self.trace_row())
+
+    def _serve(self, now_s: float) -> None:
+        modes, antenna = self._modes, self._antenna
         modes.step(antenna.receiver.is_acquired, now_s)
         if self._faults.stops_the_drives:
             modes.leave_autotrack(AcuMode.FAULT, now_s)
         self._watch_registers(now_s)
         self._drive(self._registers.step())
         self._note_changes()
-        if self.observer is not None and self._tick % TRACE_STEPS == 0:
-            self.observer(self.trace_row())
 
     def _watch_registers(self, now_s: float) -> None:
         limit_s = self._parameters.watchdog_s

@@ -4,6 +4,7 @@ Angles of the axes are those of the encoder, azimuth continuous; the beam points
 tilt axis moves, but does not turn the beam.
 """
 
+from dataclasses import dataclass
 from enum import Enum, auto
 from math import cos, radians
 from random import Random
@@ -33,6 +34,29 @@ class Drive(Enum):
     STOW = auto()
 
 
+@dataclass(slots=True)
+class AntennaTrouble:
+    """What is wrong with the encoders, with what holds the beam, and with what is heard."""
+
+    frozen_az_deg: float | None = None  # what the read-out shows instead
+    frozen_el_deg: float | None = None
+    slip_az_deg: float = 0.0  # reading minus what it was before
+    slip_el_deg: float = 0.0
+    is_turn_wrong: bool = False
+    carrier_deg: tuple[float, float] | None = None  # the receiver hears this direction, and no satellite
+    play_deg: tuple[float, float] = (0.0, 0.0)  # between encoder and beam, full width
+    _beam_deg: tuple[float, float] | None = None
+
+    def beam_deg(self, az_deg: float, el_deg: float) -> tuple[float, float]:
+        """The beam behind a drive with play: it is dragged along by half of the play."""
+        was = self._beam_deg or (az_deg, el_deg)
+        half_az_deg, half_el_deg = self.play_deg[0] / 2.0, self.play_deg[1] / 2.0
+        az_beam_deg = min(max(was[0], az_deg - half_az_deg), az_deg + half_az_deg)
+        el_beam_deg = min(max(was[1], el_deg - half_el_deg), el_deg + half_el_deg)
+        self._beam_deg = az_beam_deg, el_beam_deg
+        return self._beam_deg
+
+
 class Antenna:
     """Each 50 Hz step: move_and_sense(), then one of halt(), follow(), track(), coast() and stow()."""
 
@@ -49,6 +73,8 @@ class Antenna:
         self.direction: Direction | None = None
         self.offset: Offset | None = None
         self.has_signal = False
+        self.trouble = AntennaTrouble()
+        self._heard: Offset | None = None
         self._sky = parts.sky
         self._encoder = scenario.encoder
         self._encoder_random = Random(f"{parts.seed} encoder")
@@ -61,7 +87,7 @@ class Antenna:
     @property
     def is_sector_high(self) -> bool:
         """Whether the azimuth is in the high half of its range."""
-        return self.az.angle_deg >= self._middle_az_deg
+        return (self.az.angle_deg >= self._middle_az_deg) != self.trouble.is_turn_wrong
 
     @property
     def tilt_code(self) -> int:
@@ -71,7 +97,12 @@ class Antenna:
     @property
     def boresight_deg(self) -> tuple[float, float]:
         """True azimuth (continuous) and elevation of the beam."""
-        return self.az.angle_deg - self._encoder.azimuth_bias_deg, self.el.angle_deg - self._encoder.elevation_bias_deg
+        encoder, trouble = self._encoder, self.trouble
+        az_deg = self.az.angle_deg - encoder.azimuth_bias_deg - trouble.slip_az_deg
+        el_deg = self.el.angle_deg - encoder.elevation_bias_deg - trouble.slip_el_deg
+        if trouble.play_deg == (0.0, 0.0):
+            return az_deg, el_deg
+        return trouble.beam_deg(az_deg, el_deg)
 
     def reading_deg(self, part_s: float) -> tuple[float, float]:
         """Azimuth (continuous) and elevation as the encoders show them, with noise, part_s after the last step."""
@@ -80,7 +111,19 @@ class Antenna:
             gauss = self._encoder_random.gauss
             az_deg += gauss(0.0, noise_deg) / max(cos(radians(el_deg)), _LEAST_COS_EL)
             el_deg += gauss(0.0, noise_deg)
-        return az_deg, el_deg
+        frozen_az_deg, frozen_el_deg = self.trouble.frozen_az_deg, self.trouble.frozen_el_deg
+        return (
+            az_deg if frozen_az_deg is None else frozen_az_deg,
+            el_deg if frozen_el_deg is None else frozen_el_deg,
+        )
+
+    def slip(self, az_deg: float, el_deg: float) -> None:
+        """The encoders slip on their shafts: readings jump, the beam stays; the servo begins anew."""
+        self.az.angle_deg += az_deg
+        self.el.angle_deg += el_deg
+        self.trouble.slip_az_deg += az_deg
+        self.trouble.slip_el_deg += el_deg
+        self._driven_by = Drive.HALT
 
     def lose_power(self) -> None:
         """Everything stops where it is."""
@@ -103,7 +146,10 @@ class Antenna:
         if self.direction is not None:
             self.offset = offset_in_beam(self.direction[0], self.direction[1], *self.boresight_deg)
         heard = None if is_silent else self.offset
-        self.has_signal = heard is not None and is_connected
+        if self.trouble.carrier_deg is not None:
+            heard = offset_in_beam(*self.trouble.carrier_deg, *self.boresight_deg)
+        self._heard = heard
+        self.has_signal = self.offset is not None and not is_silent and is_connected
         self.receiver.is_valid = is_connected
         self.receiver.sense(None if heard is None else heard.angle_deg, fade_db, threshold_db)
 
@@ -141,10 +187,10 @@ class Antenna:
     def track(self, lowest_el_deg: float) -> None:
         """Drive by the error signal of the receiver; without a satellite the axes stand."""
         begins = self._begins(Drive.TRACK)
-        if self.offset is None:
+        if self._heard is None:
             self.halt()
             return
-        measured = self.receiver.error_signal(self.offset)
+        measured = self.receiver.error_signal(self._heard)
         if begins:
             self._autotrack.start(measured)
         self._autotrack.drive(measured, lowest_el_deg)

@@ -9,12 +9,15 @@ from collections.abc import Callable
 from acu_daemon.edge.clock import Clock
 from acu_daemon.protocol.sa3842 import CommandDecoder, CommandEvent
 from acu_daemon.sim.acu import FakeAcu
+from acu_daemon.sim.fault_board import FaultBoard
+from acu_daemon.sim.frame_faults import FaultyWire
 
 
 class AcuLine:
     """One line to a FakeAcu.  `send` takes a reply's first byte, then pieces of at most piece_byte_count bytes.
 
     byte_time_s is 10/baud, or 0 for a line without a pace of its own; gap_s is the pause that drops a frame.
+    board: the faults of its frames.
     """
 
     def __init__(
@@ -26,12 +29,14 @@ class AcuLine:
         gap_s: float,
         byte_time_s: float = 0.0,
         piece_byte_count: int = 1,
+        board: FaultBoard | None = None,
     ) -> None:
         self._acu = acu
         self._clock = clock
         self._send = send
         self._byte_time_s = byte_time_s
         self._piece_byte_count = piece_byte_count
+        self._wire = None if board is None else FaultyWire(board, self._pace, self._on_wire)
         self._decoder = CommandDecoder(acu.address, gap_s)
         self._loop = asyncio.get_running_loop()
         self._input_free_s = self._output_free_s = self._loop.time()
@@ -43,6 +48,12 @@ class AcuLine:
 
     def receive(self, data: bytes) -> None:
         """Take bytes that the host has written now."""
+        if self._wire is None:
+            self._on_wire(data)
+        else:
+            self._wire.from_host(data)
+
+    def _on_wire(self, data: bytes) -> None:
         start_s = max(self._loop.time(), self._input_free_s)
         self._input_free_s = start_s + len(data) * self._byte_time_s
         self._loop.call_at(self._input_free_s, self._arrive, data, start_s)
@@ -54,9 +65,17 @@ class AcuLine:
                 self._loop.call_later(self._acu.reply_latency_s, self._execute, event)
 
     def _execute(self, event: CommandEvent) -> None:
-        if not self._is_open:
+        if not self._is_open or not self._acu.is_powered:
             return
         reply = self._acu.execute(event, self._clock.tai_s())
+        if self._wire is None:
+            self._pace(reply)
+        else:
+            self._wire.from_acu(reply)
+
+    def _pace(self, reply: bytes) -> None:
+        if not self._is_open:
+            return
         if self._byte_time_s == 0.0:
             self._send(reply)
             return

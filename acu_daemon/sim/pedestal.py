@@ -3,7 +3,9 @@
 Angles are those of the encoder, continuous through north.  Between two steps an axis moves at a constant rate.
 """
 
-from math import copysign, sqrt
+from dataclasses import dataclass, field
+from math import copysign, exp, inf, sqrt
+from random import Random
 
 from acu_daemon.model import AxisLimits
 
@@ -23,6 +25,25 @@ def approach_rate_deg_s(gap_deg: float, gain_per_s: float, acceleration_deg_s2: 
     return copysign(sqrt(2.0 * acceleration_deg_s2 * (gap - linear_deg / 2.0)), gap_deg)
 
 
+GUST_TIME_S = 1.0  # correlation time of the wind's gusts
+_GUST_KEEP = exp(-STEP_S / GUST_TIME_S)
+_GUST_RENEW = sqrt(1.0 - _GUST_KEEP**2)
+
+
+@dataclass(slots=True)
+class AxisTrouble:
+    """What is wrong with an axis."""
+
+    is_stuck: bool = False
+    is_reversed: bool = False
+    runaway_deg_s: float | None = None  # while it is driven, whatever the servo asks for
+    rate_share: float = 1.0  # of the fastest rate
+    upper_stop_deg: float = inf  # a limit switch that tripped here
+    lower_stop_deg: float = -inf
+    gust_deg_s: float = 0.0  # 1 sigma
+    random: Random = field(default_factory=Random)
+
+
 class Axis:
     """One axis.  Each 50 Hz step: move(), then one of drive_to(), drive_at() and halt()."""
 
@@ -31,12 +52,17 @@ class Axis:
         self.angle_deg = min(max(angle_deg, limits.min_deg), limits.max_deg)
         self.rate_deg_s = 0.0
         self.is_clamped = False
+        self.trouble: AxisTrouble | None = None
+        self._moves_at_deg_s = 0.0
+        self._gust_deg_s = 0.0
+        self._is_driven = False
         self._step_deg_s = limits.max_acceleration_deg_s2 * STEP_S
         self._braking_deg_s2 = BRAKING_SHARE * limits.max_acceleration_deg_s2
 
     def angle_after_deg(self, after_s: float) -> float:
         """Angle a part of a step after the last one."""
-        return self.angle_deg + self.rate_deg_s * after_s
+        rate_deg_s = self.rate_deg_s if self.trouble is None else self._moves_at_deg_s
+        return self.angle_deg + rate_deg_s * after_s
 
     @property
     def is_moving(self) -> bool:
@@ -44,20 +70,42 @@ class Axis:
 
     @property
     def is_at_max(self) -> bool:
-        return self.angle_deg >= self.limits.max_deg - END_BAND_DEG
+        return self.angle_deg >= self._ends_deg()[1] - END_BAND_DEG
 
     @property
     def is_at_min(self) -> bool:
-        return self.angle_deg <= self.limits.min_deg + END_BAND_DEG
+        return self.angle_deg <= self._ends_deg()[0] + END_BAND_DEG
+
+    def _ends_deg(self) -> tuple[float, float]:
+        limits, trouble = self.limits, self.trouble
+        if trouble is None:
+            return limits.min_deg, limits.max_deg
+        return max(limits.min_deg, trouble.lower_stop_deg), min(limits.max_deg, trouble.upper_stop_deg)
 
     def move(self) -> None:
         """Move for one step; the mechanical end is the soft limit."""
-        angle_deg = self.angle_deg + self.rate_deg_s * STEP_S
-        if angle_deg > self.limits.max_deg:
-            angle_deg, self.rate_deg_s = self.limits.max_deg, 0.0
-        elif angle_deg < self.limits.min_deg:
-            angle_deg, self.rate_deg_s = self.limits.min_deg, 0.0
+        rate_deg_s = self.rate_deg_s if self.trouble is None else self._troubled_rate_deg_s(self.trouble)
+        angle_deg = self.angle_deg + rate_deg_s * STEP_S
+        least_deg, most_deg = self._ends_deg()
+        if angle_deg > most_deg:
+            angle_deg, self.rate_deg_s = most_deg, 0.0
+        elif angle_deg < least_deg:
+            angle_deg, self.rate_deg_s = least_deg, 0.0
         self.angle_deg = angle_deg
+
+    def _troubled_rate_deg_s(self, trouble: AxisTrouble) -> float:
+        """How fast the axis really moves during the coming step."""
+        if trouble.is_stuck:
+            self.rate_deg_s = 0.0
+        elif trouble.runaway_deg_s is not None and self._is_driven:
+            self.rate_deg_s = trouble.runaway_deg_s
+        rate_deg_s = -self.rate_deg_s if trouble.is_reversed else self.rate_deg_s
+        if trouble.gust_deg_s and not trouble.is_stuck:
+            push_deg_s = trouble.random.gauss(0.0, trouble.gust_deg_s)
+            self._gust_deg_s = _GUST_KEEP * self._gust_deg_s + _GUST_RENEW * push_deg_s
+            rate_deg_s += self._gust_deg_s
+        self._moves_at_deg_s = rate_deg_s
+        return rate_deg_s
 
     def drive_to(self, target_deg: float, target_rate_deg_s: float) -> None:
         """Close in on a target inside the limits that moves at a known rate."""
@@ -81,9 +129,13 @@ class Axis:
         """Brake to a stand."""
         self.is_clamped = False
         self._change_rate(0.0)
+        self._is_driven = False
 
     def _change_rate(self, wanted_deg_s: float) -> None:
         most_deg_s, step_deg_s, rate_deg_s = self.limits.max_rate_deg_s, self._step_deg_s, self.rate_deg_s
+        self._is_driven = True
+        if self.trouble is not None:
+            most_deg_s *= self.trouble.rate_share
         if wanted_deg_s > most_deg_s:
             wanted_deg_s = most_deg_s
         elif wanted_deg_s < -most_deg_s:

@@ -5,6 +5,7 @@
 [receiver]   peak_agc_db, agc_noise_db, tracking_noise_deg
 [acu]        has_tilt, reply_latency_s, mode, azimuth_deg, elevation_deg
 [[loss]]     start_s + duration_s, or from_utc + to_utc; cause; depth_db for a fade
+[[fault]]    verb, and start_s, duration_s, count, probability, value, axis, on, seed (fault_verbs.py)
 """
 
 import tomllib
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from acu_daemon.errors import ConfigError
+from acu_daemon.sim.fault_verbs import Fault, read_fault
 from acu_daemon.sim.toml_table import read_table
 
 Cause = Literal["receiver", "silence-zone", "fade"]
@@ -94,9 +96,11 @@ class Scenario:
     receiver: ReceiverChoice = ReceiverChoice()
     acu: AcuChoice = AcuChoice()
     losses: tuple[Loss, ...] = ()
+    faults: tuple[Fault, ...] = ()
 
 
 _SECTIONS = {"sky": SkyErrors, "encoder": Encoder, "receiver": ReceiverChoice, "acu": AcuChoice}
+_LISTS = ("loss", "fault")
 
 
 def read_scenario(path: Path) -> Scenario:
@@ -105,16 +109,21 @@ def read_scenario(path: Path) -> Scenario:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise ConfigError(f"{path}: {error}") from None
-    if unknown := sorted(document.keys() - _SECTIONS.keys() - {"loss"}):
-        raise ConfigError(f"{path}: unknown table {unknown[0]!r}, expected {', '.join(_SECTIONS)} or [[loss]]")
-    losses = document.get("loss", [])
-    if not isinstance(losses, list):
-        raise ConfigError(f"{path}: loss is written [[loss]], once for each")
+    if unknown := sorted(document.keys() - _SECTIONS.keys() - set(_LISTS)):
+        raise ConfigError(
+            f"{path}: unknown table {unknown[0]!r}, expected {', '.join(_SECTIONS)}, [[loss]] or [[fault]]"
+        )
+    lists = {name: document.get(name, []) for name in _LISTS}
+    for name, tables in lists.items():
+        if not isinstance(tables, list):
+            raise ConfigError(f"{path}: {name} is written [[{name}]], once for each")
     try:
         sections: dict[str, Any] = {}
         for name, section in _SECTIONS.items():
             sections[name] = read_table(section, document.get(name, {}), name)
-        return Scenario(**sections, losses=tuple(_loss(table, i) for i, table in enumerate(losses, start=1)))
+        losses = tuple(_loss(table, i) for i, table in enumerate(lists["loss"], start=1))
+        faults = tuple(read_fault(table, f"fault {i}") for i, table in enumerate(lists["fault"], start=1))
+        return Scenario(**sections, losses=losses, faults=faults)
     except ValueError as error:
         raise ConfigError(f"{path}: {error}") from None
 

@@ -45,6 +45,10 @@ def _value(key: str, value: object, hint: Any) -> object:
         return value
     if key.endswith("_utc"):
         return _tai_s(value)
+    if hint is int:
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise ValueError("expected a whole number")
+        return value
     if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
         raise ValueError("expected a number")
     if key.endswith(NOT_NEGATIVE) and value < 0:
