@@ -10,7 +10,6 @@ from math import hypot
 import numpy as np
 
 from acu_daemon.assist.full_states import (
-    BROUWER_SIGMAS,
     ORBIT,
     STATE_COUNT,
     Prior,
@@ -156,9 +155,8 @@ def _mean(carried: CarryOver) -> Array:
 
 
 def _element_sigmas(carried: CarryOver, settings: EstimatorSettings) -> ElementSigmas:
-    if isinstance(settings.orbit_sigmas, ElementSigmas):
-        return settings.orbit_sigmas
-    return BROUWER_SIGMAS if carried.elements_kind == "brouwer" else ElementSigmas()
+    sigmas = settings.sigmas_of(carried.elements_kind)
+    return sigmas if isinstance(sigmas, ElementSigmas) else ElementSigmas()
 
 
 def _held_to_long_mean_motion(mean: Array, carried: CarryOver, settings: EstimatorSettings) -> tuple[Array, Array]:

@@ -21,13 +21,6 @@ STATE_COUNT = 13
 ORBIT, BIAS, STATION = slice(0, 6), slice(6, 10), slice(10, 13)
 STEPS = (1e-5, 1e-5, 1e-10, 1e-5, 1e-5, 1e-5)  # for differences: some 70 m each; 60 m after a day for the mean motion
 
-BROUWER_SIGMAS = ElementSigmas(  # no long-period terms (1 to 2 km) and no drag
-    raan_deg=0.03,
-    mean_motion_rad_min=5e-6,
-    mean_motion_per_day_rad_min=2e-6,
-    e_vector=2e-4,
-    inclination_deg=0.02,
-)
 _UP_SHARE = 0.1  # coordinates are rounded in latitude and longitude; heights are known much better
 
 
@@ -72,7 +65,7 @@ def states_of(correction: Correction, bias: AngleBias, shift_enu_m: tuple[float,
 def make_prior(source: Propagator, settings: EstimatorSettings, at_tai_s: float) -> Prior:
     """What is known before the first reading, at at_tai_s; of the orbit, from kind and age unless the settings say."""
     covariance = np.zeros((STATE_COUNT, STATE_COUNT))
-    sigmas = settings.orbit_sigmas or (BROUWER_SIGMAS if source.kind == "brouwer" else ElementSigmas())
+    sigmas = settings.sigmas_of(source.kind)
     if isinstance(sigmas, StateSigmas):
         covariance[ORBIT, ORBIT] = _orbit_covariance_of_state(source, sigmas)
     else:
@@ -92,14 +85,15 @@ def make_prior(source: Propagator, settings: EstimatorSettings, at_tai_s: float)
 def _orbit_covariance(sigmas: ElementSigmas, age_s: float) -> Array:
     days = age_s / DAY_S
     mean_motion_rad_s = hypot(sigmas.mean_motion_rad_min, sigmas.mean_motion_per_day_rad_min * days) / 60.0
+    e_vector = hypot(sigmas.e_vector, sigmas.e_vector_per_day * days)
     return np.diag(
         np.square(
             [
                 radians(sigmas.raan_deg),
                 radians(sigmas.mean_anomaly_deg),
                 mean_motion_rad_s,
-                sigmas.e_vector,
-                sigmas.e_vector,
+                e_vector,
+                e_vector,
                 radians(sigmas.inclination_deg),
             ]
         )

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from acu_daemon.assist.full import FullEstimator
-from acu_daemon.assist.full_states import BROUWER_SIGMAS, make_prior, states_of
+from acu_daemon.assist.full_states import make_prior, states_of
 from acu_daemon.assist.offsets import Offsets, offsets
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings, StateSigmas
 from acu_daemon.errors import OrbitError
@@ -23,7 +23,7 @@ SURE_ALONG = 3.0  # the mean anomaly is never given more room than this
 
 def widened(source: Propagator, settings: EstimatorSettings, factor: float) -> EstimatorSettings:
     """The settings with an orbit that is worth less: all its sigmas are factor times as large."""
-    sigmas = settings.orbit_sigmas or (BROUWER_SIGMAS if source.kind == "brouwer" else ElementSigmas())
+    sigmas = settings.sigmas_of(source.kind)
     if isinstance(sigmas, StateSigmas):
         wide: ElementSigmas | StateSigmas = StateSigmas(factor * sigmas.position_m, factor * sigmas.velocity_m_s)
     else:
@@ -33,6 +33,7 @@ def widened(source: Propagator, settings: EstimatorSettings, factor: float) -> E
             mean_motion_rad_min=factor * sigmas.mean_motion_rad_min,
             mean_motion_per_day_rad_min=factor * sigmas.mean_motion_per_day_rad_min,
             e_vector=factor * sigmas.e_vector,
+            e_vector_per_day=factor * sigmas.e_vector_per_day,
             inclination_deg=factor * sigmas.inclination_deg,
         )
     return replace(settings, orbit_sigmas=wide, azimuth=None, elevation=None)
@@ -44,20 +45,24 @@ class Judge:
     def __init__(self, source: Propagator, site: Site, settings: EstimatorSettings) -> None:
         self._source, self._site, self._settings = source, site, settings
 
-    def verdict(self, before: Readings | None, questioned: Readings, factor: float) -> Offsets | None:
-        """Offsets of the questioned readings from the orbit that fits, or None: no orbit near the elements does."""
+    def best_offsets(self, readings: Readings, factor: float) -> Offsets | None:
+        """Offsets from the orbit that fits the readings best, with its sigmas factor times as large; None without one."""
         settings = widened(self._source, self._settings, factor)
         estimator = FullEstimator(self._source, self._site, settings)
-        together = questioned if before is None else Readings.joined([before, questioned])
         try:
-            estimator.add(together)
+            estimator.add(readings)
             fit = estimator.fit()
             if fit is None:
                 return None
             # the fit's own sigma would excuse what it cannot explain
-            fit = replace(fit, covariance=None)
-            seen = offsets(self._source, self._site, fit, together, settings)
+            return offsets(self._source, self._site, replace(fit, covariance=None), readings, settings)
         except (OrbitError, np.linalg.LinAlgError):
+            return None
+
+    def verdict(self, before: Readings | None, questioned: Readings, factor: float) -> Offsets | None:
+        """Offsets of the questioned readings from the orbit that fits, or None: no orbit near the elements does."""
+        seen = self.best_offsets(questioned if before is None else Readings.joined([before, questioned]), factor)
+        if seen is None:
             return None
         old, new = seen.part(slice(None, -len(questioned))), seen.part(slice(-len(questioned), None))
         if float(np.mean(new.is_near)) < NEAR_SHARE:

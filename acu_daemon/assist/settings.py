@@ -29,7 +29,8 @@ DAEMON = KalmanTuning(0.2, 2.0, 5e-5, 2e-4)  # measured over a population of orb
 class ElementSigmas:
     """What mean elements are worth, 1 sigma of each: the default for element sets (docs/decisions).
 
-    The mean motion's grows with the age of the elements.  e_vector: each of e cos argp and e sin argp.
+    Those of the mean motion and of the e-vector grow with the age of the elements.  e_vector: each of e cos argp and
+    e sin argp.
     """
 
     raan_deg: float = 0.02
@@ -37,7 +38,26 @@ class ElementSigmas:
     mean_motion_rad_min: float = 5e-7
     mean_motion_per_day_rad_min: float = 1e-6
     e_vector: float = 4e-5
+    e_vector_per_day: float = 0.0
     inclination_deg: float = 0.007
+
+
+BROUWER_SIGMAS = ElementSigmas(  # no long-period terms (0.4 km a day in the e-vector) and no drag
+    raan_deg=0.03,
+    mean_motion_rad_min=5e-6,
+    mean_motion_per_day_rad_min=4e-6,
+    e_vector=2e-4,
+    e_vector_per_day=6e-5,
+    inclination_deg=0.02,
+)
+OEM_SIGMAS = ElementSigmas(  # of an orbit determination; the anomaly is left free for a manoeuvre or a wrong clock
+    raan_deg=0.005,
+    mean_motion_rad_min=1e-7,
+    mean_motion_per_day_rad_min=3e-7,
+    e_vector=1e-5,
+    inclination_deg=0.002,
+)
+_BY_KIND = {"brouwer": BROUWER_SIGMAS, "oem": OEM_SIGMAS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,3 +95,7 @@ class EstimatorSettings:
     bias_sigma_elevation_cot_deg: float = 0.0
     orbit_sigmas: ElementSigmas | StateSigmas | None = None
     station_sigma_m: float = 0.0
+
+    def sigmas_of(self, kind: str) -> ElementSigmas | StateSigmas:
+        """What the orbit of a source is worth: as configured, else by its kind."""
+        return self.orbit_sigmas or _BY_KIND.get(kind, ElementSigmas())
