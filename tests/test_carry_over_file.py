@@ -1,9 +1,10 @@
 """The carry-over's file: exact, whole at any time, never fatal; and who writes it during a pass, and when."""
 
-import asyncio
 import json
+import os
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from structlog.testing import capture_logs
 from acu_daemon.assist.carry_over import CarryOver
 from acu_daemon.edge import carry_over as edge
 from acu_daemon.edge.carry_over import FitKeeper, carry_over_path, read_carry_over, write_carry_over
+from acu_daemon.edge.writer import Writer
 from acu_daemon.model import AngleBias, Correction, FitResult, Station
 
 ROOT = np.random.default_rng(1).normal(size=(13, 13)) * np.logspace(-9, 3, 13)[:, None]
@@ -138,7 +140,7 @@ def test_a_write_that_fails_leaves_the_old_file_and_nothing_beside_it(
     def full(_: int) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(edge.os, "fsync", full)
+    monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OSError, match="No space"):
         written(path, estimator="other")
     assert read_carry_over(path) == CARRIED
@@ -166,61 +168,52 @@ class Disk:
         self.times.append(carried.at_tai_s)
 
 
-def keeper(path: Path) -> FitKeeper:
+@pytest.fixture
+def writer() -> Iterator[Writer]:
+    made = Writer("files")
+    yield made
+    assert made.close()
+
+
+def keeper(path: Path, writer: Writer) -> FitKeeper:
     return FitKeeper(
-        path, "ISS", lambda fit: None if fit.reading_count < 30 else replace(CARRIED, at_tai_s=fit.at_tai_s)
+        path, "ISS", lambda fit: None if fit.reading_count < 30 else replace(CARRIED, at_tai_s=fit.at_tai_s), writer
     )
 
 
-async def test_the_first_fit_is_saved_at_once_and_the_last_one_at_the_end(
-    path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_fit_is_saved_at_once_then_each_period_and_the_last_one_at_the_end(
+    path: Path, monkeypatch: pytest.MonkeyPatch, writer: Writer
 ) -> None:
-    disk, kept = Disk(monkeypatch), keeper(path)
-    async with asyncio.TaskGroup() as group:
-        group.create_task(kept.run())
-        for second in range(5):
-            kept.offer(replace(FIT, at_tai_s=float(second)))
-            while second == 0 and not disk.times:
-                await asyncio.sleep(0.0)
-            await asyncio.sleep(0.0)
-        assert disk.times == [0.0]
-        kept.close()
-    assert disk.times == [0.0, 4.0]
+    disk, kept = Disk(monkeypatch), keeper(path, writer)
+    for second in range(25):
+        kept.offer(replace(FIT, at_tai_s=float(second)))
+        while len(disk.times) <= second // 10:
+            time.sleep(0.001)
+    assert disk.times == [0.0, 10.0, 20.0]
+    kept.flush()
+    kept.flush()
+    assert writer.close()
+    assert disk.times == [0.0, 10.0, 20.0, 24.0]
     assert threading.get_ident() not in disk.threads
 
 
-async def test_between_them_a_fit_is_saved_each_period(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(edge, "SAVE_PERIOD_S", 0.0)
-    disk, kept = Disk(monkeypatch), keeper(path)
-    async with asyncio.TaskGroup() as group:
-        group.create_task(kept.run())
-        for second in range(3):
-            kept.offer(replace(FIT, at_tai_s=float(second)))
-            while len(disk.times) <= second:
-                await asyncio.sleep(0.0)
-        kept.close()
-    assert disk.times == [0.0, 1.0, 2.0]
-
-
-async def test_a_pass_without_a_fit_writes_nothing(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    disk, kept = Disk(monkeypatch), keeper(path)
-    async with asyncio.TaskGroup() as group:
-        group.create_task(kept.run())
-        kept.offer(replace(FIT, reading_count=1))
-        kept.close()
+def test_a_pass_without_a_fit_writes_nothing(path: Path, monkeypatch: pytest.MonkeyPatch, writer: Writer) -> None:
+    disk, kept = Disk(monkeypatch), keeper(path, writer)
+    kept.offer(replace(FIT, reading_count=1))
+    kept.flush()
+    assert writer.close()
     assert disk.times == []
 
 
-async def test_a_full_disk_is_told_once_and_stops_nothing(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(edge, "SAVE_PERIOD_S", 0.0)
-    disk, kept = Disk(monkeypatch), keeper(path)
+def test_p10_a_full_disk_is_told_once_and_stops_nothing(
+    path: Path, monkeypatch: pytest.MonkeyPatch, writer: Writer
+) -> None:
+    disk, kept = Disk(monkeypatch), keeper(path, writer)
     disk.error = OSError(28, "No space left on device")
     with capture_logs() as told:
-        async with asyncio.TaskGroup() as group:
-            group.create_task(kept.run())
-            for second in range(3):
-                kept.offer(replace(FIT, at_tai_s=float(second)))
-                while disk.failed_count <= second:
-                    await asyncio.sleep(0.0)
-            kept.close()
+        for period in range(3):
+            kept.offer(replace(FIT, at_tai_s=20.0 * period))
+            while disk.failed_count <= period:
+                time.sleep(0.001)
+        assert writer.close()
     assert [(one["event"], one["file"]) for one in told] == [("carry_over.not_saved", str(path))]

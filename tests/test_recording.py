@@ -1,12 +1,17 @@
 """Recorded readings: what is written can be read, and every bad line is told by its number."""
 
+import resource
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from structlog.testing import capture_logs
 
 from acu_daemon.edge.recording import RecordingWriter, read_readings
+from acu_daemon.edge.writer import Writer
 from acu_daemon.errors import UsageError
 from acu_daemon.model import Reading
 from acu_daemon.orbit.timescales import tai_from_utc
@@ -75,12 +80,115 @@ def test_lines_are_in_the_file_at_least_once_a_second_of_readings(tmp_path: Path
             assert path.read_text().count("\n") - 1 >= tick - 9
 
 
-def test_a_full_disk_ends_the_recording_and_not_the_pass(capsys: pytest.CaptureFixture[str]) -> None:
-    with RecordingWriter(Path("/dev/full")) as recording:
-        for tick in range(20):
+def record(path: Path, *seconds: float, **parts: Any) -> None:
+    with RecordingWriter(path, **parts) as recording:
+        for second in seconds:
+            recording.add(Reading(second, 1.0, 2.0, True))
+
+
+def seconds_in(path: Path) -> list[float]:
+    return [tai_s for _, _, tai_s in read_readings(path)]
+
+
+def test_p10_a_full_disk_is_told_once_and_stops_nothing() -> None:
+    with capture_logs() as logs:
+        record(Path("/dev/full"), *range(100, 120))
+    assert [log["event"] for log in logs] == ["record.failed"]
+
+
+@pytest.fixture
+def full_at() -> Iterator[Callable[[int], None]]:
+    """Files end at so many bytes, as on a full disk, or with -1 at their old limit."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (before[0] if size < 0 else size, before[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def test_p10_a_recording_goes_on_with_whole_lines_when_there_is_space_again(
+    tmp_path: Path, full_at: Callable[[int], None]
+) -> None:
+    path = tmp_path / "x.csv"
+    with capture_logs() as logs, RecordingWriter(path) as recording:
+        full_at(200_000)
+        for tick in range(6000):
             recording.add(Reading(100.0 + tick, 1.0, 2.0, True))
-        assert recording.has_failed
-    assert capsys.readouterr().out.count("record.failed") == 1
+            if tick == 5500:
+                full_at(-1)
+    full_at(-1)
+    assert path.read_bytes().endswith(b"\n")
+    seconds = seconds_in(path)
+    assert seconds[0] == 100.0
+    assert seconds[-1] == 6099.0
+    lost = 6000 - len(seconds)
+    assert [(log["event"], log.get("lost_count")) for log in logs] == [
+        ("record.failed", None),
+        ("record.resumed", lost),
+    ]
+
+
+def test_p10_a_restart_goes_on_in_the_same_file(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    record(path, 100.0, 101.0)
+    record(path, 101.0, 102.0, now_tai_s=101.5)
+    assert seconds_in(path) == [100.0, 101.0, 102.0]
+    record(path)
+    assert seconds_in(path) == [100.0, 101.0, 102.0]
+
+
+@pytest.mark.parametrize("cut", range(1, 47))
+def test_p10_a_line_that_a_loss_of_power_tore_is_left_out_by_reader_and_restart(tmp_path: Path, cut: int) -> None:
+    path = tmp_path / "x.csv"
+    record(path, 100.0, 101.0)
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-cut])
+    said: list[str] = []
+    is_lost = cut > 1  # the line's end alone is no loss
+    assert [tai_s for _, _, tai_s in read_readings(path, said.append)] == ([100.0] if is_lost else [100.0, 101.0])
+    assert said == ([f"{path}, line 3: torn, and left out"] if 1 < cut < 46 else [])
+    with capture_logs() as logs:
+        record(path, 102.0)
+    assert seconds_in(path) == [100.0, 102.0]
+    assert [log["event"] for log in logs] == (["record.torn"] if cut < 46 else [])
+
+
+@pytest.mark.parametrize("size", range(len(HEADER) + 2))
+def test_p10_a_recording_torn_in_its_header_begins_anew(tmp_path: Path, size: int) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text(f"{HEADER}\n"[:size])
+    record(path, 100.0)
+    assert seconds_in(path) == [100.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("my thesis\n", "this file is no recording and is left alone: choose another, or move it away"),
+        (f"{HEADER},more\n", "this file is no recording and is left alone: choose another, or move it away"),
+        (f"{HEADER}\nx\n", "its last line is no reading (expected 4 fields, found 1): choose another"),
+    ],
+)
+def test_a_foreign_file_is_not_overwritten(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text(text)
+    with pytest.raises(UsageError) as error:
+        record(path, 100.0)
+    assert str(error.value) == f"--record {path}: {said}"
+    assert path.read_text() == text
+
+
+def test_a_recording_that_ends_later_than_now_is_not_continued(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    record(path, 100.0)
+    with pytest.raises(UsageError, match=r"its last reading, 2000-01-01T12:01:08Z, is later than now, .*:07Z, and"):
+        record(path, 99.5, now_tai_s=99.0)
+    assert seconds_in(path) == [100.0]
+
+
+def test_beside_the_loop_every_line_is_in_the_file_once_the_writer_has_ended(tmp_path: Path) -> None:
+    path, writer = tmp_path / "x.csv", Writer("files")
+    record(path, *range(100, 200), writer=writer)
+    assert writer.close(60.0)
+    assert seconds_in(path) == list(range(100, 200))
 
 
 def test_a_recording_that_cannot_be_made_is_wrong_use(tmp_path: Path) -> None:

@@ -1,11 +1,14 @@
 """Where state lives, that a rehearsal keeps its own, and the snapshot that never stops a tick."""
 
 import json
+import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from acu_daemon.edge.state import EVERY_TICKS, SNAPSHOT, SnapshotFile, state_directory
+from acu_daemon.edge.writer import Writer
 from acu_daemon.errors import UsageError
 
 
@@ -73,19 +76,47 @@ def test_a_user_without_a_home_is_told_what_to_do(monkeypatch: pytest.MonkeyPatc
         state_directory(None, is_rehearsal=False)
 
 
+@dataclass(frozen=True)
+class Seen:
+    tick: int
+    az_deg: float | None = None
+
+
 def test_a_snapshot_is_written_once_in_ten_ticks_and_whole(tmp_path: Path) -> None:
-    snapshots = SnapshotFile(tmp_path)
+    writer = Writer("files")
+    snapshots = SnapshotFile(tmp_path, writer)
     seen = []
     for tick in range(1, 35):
-        snapshots.write({"tick": tick, "az_deg": None})
-        if (tmp_path / SNAPSHOT).exists():
+        snapshots.write(Seen(tick))
+        while writer.waiting_count or (tick >= EVERY_TICKS and not (tmp_path / SNAPSHOT).exists()):
+            time.sleep(0.001)
+        if tick % EVERY_TICKS == EVERY_TICKS - 1 and tick > EVERY_TICKS:
             seen.append(json.loads((tmp_path / SNAPSHOT).read_text())["tick"])
-    assert sorted(set(seen)) == [EVERY_TICKS, 2 * EVERY_TICKS, 3 * EVERY_TICKS]
+    assert writer.close()
+    assert seen == [EVERY_TICKS, 2 * EVERY_TICKS]
+    assert json.loads((tmp_path / SNAPSHOT).read_text()) == {"tick": 3 * EVERY_TICKS, "az_deg": None}
     assert [path.name for path in tmp_path.iterdir()] == [SNAPSHOT]
 
 
 def test_a_snapshot_that_cannot_be_written_is_counted_and_stops_nothing(tmp_path: Path) -> None:
-    snapshots = SnapshotFile(tmp_path / "gone")
-    for _ in range(3 * EVERY_TICKS):
-        snapshots.write({})
-    assert snapshots.failed_count == 3
+    writer = Writer("files")
+    snapshots = SnapshotFile(tmp_path / "gone", writer)
+    for tick in range(3 * EVERY_TICKS):
+        snapshots.write(Seen(tick))
+        while writer.waiting_count:
+            time.sleep(0.001)
+    assert writer.close()
+    assert 1 <= snapshots.failed_count <= 3
+
+
+def test_a_folder_where_everybody_may_write_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    made = tmp_path / "state"
+    made.mkdir()
+    made.chmod(0o770)  # a group's is fine
+    assert state_directory(made, is_rehearsal=False) == made
+    made.chmod(0o1777)
+    with pytest.raises(UsageError, match=rf"^{made}: everybody may write there; close it: chmod o-w {made}$"):
+        state_directory(made, is_rehearsal=False)
+    below = made / "mine"  # as below a sticky /tmp
+    assert state_directory(below, is_rehearsal=False) == below
+    assert below.stat().st_mode & 0o777 == 0o750

@@ -63,7 +63,7 @@ def command(
     for path in paths.values():
         if path.exists() and readings.exists() and path.samefile(readings):
             raise UsageError(f"--out {path} is the recording itself; give the predictions a file of their own")
-    lines = read_readings(readings)
+    lines = read_readings(readings, lambda said: typer.echo(f"warning: {said}", err=True))
     if not lines:
         raise UsageError(f"{readings}: no readings below the header")
     job = _Job(load_target(config, satellite, lines[0][2]), lines)

@@ -39,10 +39,11 @@ from acu_daemon.edge.carry_over import FitKeeper, carry_over_path, read_carry_ov
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.fit import ProcessFitRunner
 from acu_daemon.edge.link import Link, check_rate, make_link
-from acu_daemon.edge.logs import configure_logs
+from acu_daemon.edge.logs import configure_logs, tell_dropped
 from acu_daemon.edge.recording import RecordingWriter
 from acu_daemon.edge.state import SnapshotFile, state_directory
 from acu_daemon.edge.systemd import Notifier
+from acu_daemon.edge.writer import QueuedStream, Writer
 from acu_daemon.model import Pass
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.protocol.sa3842 import address_byte
@@ -81,22 +82,28 @@ def command(
     link = make_link(target.station.acu.url)
     check_rate(link, target.station.acu.period_s, target.station.acu.device_delay_s)
     directory = state_directory(state, is_rehearsal=clock.is_rehearsal)
-    snapshots = SnapshotFile(directory)
-    live = LiveLine() if sys.stderr.isatty() else None
-    configure_logs(
-        clock.tai_s,
-        tags={"REHEARSAL": True} if clock.is_rehearsal else {},
-        is_terminal=sys.stdout is not None and sys.stdout.isatty(),
-        before_line=live.clear if live else None,
-    )
     end_tai_s = math.inf if duration is None else clock.tai_s() + duration - (time.monotonic() - PROCESS_START_S)
-    _announce(target, coming, clock)
-    kept = carry_over_path(directory, target.satellite.satellite.norad_id, target.satellite.satellite.name)
-    carried = _carried(target, kept, clock.tai_s())
-    job = make_job(target, coming, link, is_rehearsal=clock.is_rehearsal, end_tai_s=end_tai_s, carried=carried)
-    with RecordingWriter(record) if record is not None else contextlib.nullcontext() as recording:
-        outcome = asyncio.run(_run(job, link, clock, live, recording, snapshots, _keeper(target, kept)))
-    structlog.get_logger("run").info("run.done", **asdict(outcome))
+    with contextlib.ExitStack() as ends:
+        output, files = Writer("log", on_drained=tell_dropped), Writer("files")
+        ends.callback(output.close)
+        ends.callback(files.close)
+        live = LiveLine(QueuedStream(sys.stderr, output)) if sys.stderr.isatty() else None
+        configure_logs(
+            clock.tai_s,
+            tags={"REHEARSAL": True} if clock.is_rehearsal else {},
+            is_terminal=sys.stdout is not None and sys.stdout.isatty(),
+            before_line=live.clear if live else None,
+            writer=output,
+        )
+        recording = ends.enter_context(RecordingWriter(record, files, clock.tai_s())) if record is not None else None
+        _announce(target, coming, clock)
+        kept = carry_over_path(directory, target.satellite.satellite.norad_id, target.satellite.satellite.name)
+        carried = _carried(target, kept, clock.tai_s())
+        job = make_job(target, coming, link, is_rehearsal=clock.is_rehearsal, end_tai_s=end_tai_s, carried=carried)
+        keeper = _keeper(target, kept, files)
+        ends.callback(keeper.flush)
+        outcome = asyncio.run(_run(job, link, clock, live, recording, SnapshotFile(directory, files), keeper))
+        structlog.get_logger("run").info("run.done", **asdict(outcome))
     if (
         outcome.has_begun
         and not outcome.has_acquired
@@ -122,9 +129,9 @@ def _carried(target: Target, path: Path, now_tai_s: float) -> CarryOver | None:
     return carried
 
 
-def _keeper(target: Target, path: Path) -> FitKeeper:
+def _keeper(target: Target, path: Path, files: Writer) -> FitKeeper:
     make = partial(carry_over_of, source=target.elements.propagator, site=target.station.site)
-    return FitKeeper(path, target.elements.label, make)
+    return FitKeeper(path, target.elements.label, make, files)
 
 
 def make_job(
@@ -192,7 +199,7 @@ async def _run(
 
     def show(seen: Snapshot) -> None:
         health.see(seen)
-        snapshots.write(asdict(seen))
+        snapshots.write(seen)
         if live is not None:
             live.show(seen)
 
@@ -203,7 +210,7 @@ async def _run(
         ProcessFitRunner(job.refit),
         on_snapshot=show,
         on_reading=recording.add if recording else None,
-        keeper=keeper,
+        on_fit=keeper.offer,
     )
     loop = asyncio.get_running_loop()
     for number in STOP_SIGNALS:

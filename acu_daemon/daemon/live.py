@@ -2,7 +2,7 @@
 
 import shutil
 import sys
-from typing import TextIO
+from typing import Protocol
 
 from acu_daemon.daemon.area import Snapshot
 from acu_daemon.orbit.timescales import utc_text
@@ -48,10 +48,18 @@ def _inside(seen: Snapshot) -> str:
     return f"in beam {sign}{seen.inside_s:.0f} s"
 
 
+class Stream(Protocol):
+    """What the line is drawn on: standard error, or a queue before it."""
+
+    def write(self, text: str, /) -> object: ...
+
+    def flush(self) -> object: ...
+
+
 class LiveLine:
     """Draws the line on a terminal; the log clears it before it prints."""
 
-    def __init__(self, stream: TextIO = sys.stderr) -> None:
+    def __init__(self, stream: Stream = sys.stderr) -> None:
         self._stream = stream
         self._is_drawn = False
         self._skip = 0

@@ -4,7 +4,7 @@ import asyncio
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import structlog
 
@@ -63,16 +63,6 @@ class Outcome:
     lateness_p99_ms: float
 
 
-class FitKeeper(Protocol):
-    """Keeps the newest accepted fit beyond the pass, beside the loop; owned by the service."""
-
-    def offer(self, fit: FitResult) -> None: ...
-
-    def close(self) -> None: ...
-
-    async def run(self) -> None: ...
-
-
 class Service:
     """Everything of one run.  `stop` ends it early and safely."""
 
@@ -85,13 +75,12 @@ class Service:
         *,
         on_snapshot: Callable[[Snapshot], None] | None = None,
         on_reading: Callable[[Reading], None] | None = None,
-        keeper: FitKeeper | None = None,
+        on_fit: Callable[[FitResult], None] | None = None,
     ) -> None:
         self._job = job
         self._clock = clock
         self._runner = runner
         self._on_snapshot = on_snapshot
-        self._keeper = keeper
         self._ticked = asyncio.Event()
         self._stop_reason = ""
         self._log: Any = structlog.get_logger("pass")
@@ -105,7 +94,7 @@ class Service:
             horizon_s=job.horizon_s,
             low_water_s=job.low_water_s,
             preposition_s=job.control.preposition_s,
-            on_fit=keeper.offer if keeper else None,
+            on_fit=on_fit,
         )
         self._foreground = Foreground(
             self._area, self._port, clock, job.control, after_tick=self._after_tick, on_reading=on_reading
@@ -125,15 +114,11 @@ class Service:
         try:
             async with asyncio.TaskGroup() as outer:
                 link = outer.create_task(self._port.keep(), name="link")
-                if self._keeper is not None:
-                    outer.create_task(self._keeper.run(), name="fit keeper")
                 try:
                     reason = await self._track()
                 finally:
                     is_stopped = await self._safe_stop()
                     link.cancel()
-                    if self._keeper is not None:
-                        self._keeper.close()
                     await self._runner.close()
         except ExceptionGroup as group:
             raise _innermost(group) from None

@@ -1,10 +1,7 @@
 """The carry-over of a satellite in the state directory: one JSON file, whole at any time, written only here."""
 
-import asyncio
-import contextlib
 import json
 import math
-import os
 import re
 from collections.abc import Callable
 from dataclasses import asdict, fields
@@ -16,6 +13,8 @@ import structlog
 
 from acu_daemon.assist.carry_over import CarryOver
 from acu_daemon.assist.full_states import STATE_COUNT
+from acu_daemon.edge.writer import Latest, Writer, replace_file
+from acu_daemon.errors import OrbitError
 from acu_daemon.model import AngleBias, Correction, FitResult, Station
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.units import Array
@@ -37,7 +36,7 @@ def read_carry_over(path: Path) -> CarryOver | None:
     try:
         with path.open("rb") as file:
             text = file.read(_LARGEST_BYTES)
-        return _from_json(json.loads(text))
+        return from_json(json.loads(text))
     except FileNotFoundError:
         return None
     except (OSError, ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
@@ -47,23 +46,8 @@ def read_carry_over(path: Path) -> CarryOver | None:
 
 
 def write_carry_over(path: Path, satellite: str, carried: CarryOver) -> None:
-    """Put the file in place, whole: written beside it, on the disk, renamed.  OSError: it cannot be."""
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        with unfinished.open("w", encoding="ascii") as file:
-            json.dump(_to_json(satellite, carried), file, indent=1, allow_nan=False)
-            file.flush()
-            os.fsync(file.fileno())
-        unfinished.replace(path)
-    except OSError:
-        with contextlib.suppress(OSError):
-            unfinished.unlink()
-        raise
-    directory = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(directory)
-    finally:
-        os.close(directory)
+    """Put the file in place, whole.  OSError: it cannot be."""
+    replace_file(path, json.dumps(to_json(satellite, carried), indent=1, allow_nan=False).encode("ascii"))
 
 
 class FitKeeper:
@@ -72,46 +56,36 @@ class FitKeeper:
     The loop never waits for the disk.  A write that fails is logged once and never stops a pass.
     """
 
-    def __init__(self, path: Path, satellite: str, carry_over_of: Callable[[FitResult], CarryOver | None]) -> None:
+    def __init__(
+        self, path: Path, satellite: str, carry_over_of: Callable[[FitResult], CarryOver | None], writer: Writer
+    ) -> None:
         self._path = path
         self._satellite = satellite
         self._carry_over_of = carry_over_of
-        self._newest: FitResult | None = None
-        self._offered = asyncio.Event()
-        self._closing = asyncio.Event()
+        self._latest = Latest(writer, self._save)
+        self._unsaved: FitResult | None = None
+        self._saved_tai_s = -math.inf
         self._has_failed = False
 
     def offer(self, fit: FitResult) -> None:
         """Take an accepted fit."""
-        self._newest = fit
-        self._offered.set()
+        self._unsaved = fit
+        if fit.at_tai_s - self._saved_tai_s >= SAVE_PERIOD_S:
+            self.flush()
 
-    def close(self) -> None:
-        """Let `run` save what is not saved yet, and end."""
-        self._closing.set()
-        self._offered.set()
-
-    async def run(self) -> None:
-        """Save until closed."""
-        while True:
-            await self._offered.wait()
-            self._offered.clear()
-            newest, self._newest = self._newest, None
-            if newest is not None:
-                await asyncio.to_thread(self._save, newest)
-            if self._closing.is_set() and self._newest is None:
-                return
-            with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(SAVE_PERIOD_S):
-                    await self._closing.wait()
+    def flush(self) -> None:
+        """Save what is not saved yet."""
+        if self._unsaved is not None:
+            self._saved_tai_s = self._unsaved.at_tai_s
+            self._latest.offer(self._unsaved)
+            self._unsaved = None
 
     def _save(self, fit: FitResult) -> None:
-        carried = self._carry_over_of(fit)
-        if carried is None:
-            return
         try:
-            write_carry_over(self._path, self._satellite, carried)
-        except (OSError, ValueError) as error:
+            carried = self._carry_over_of(fit)
+            if carried is not None:
+                write_carry_over(self._path, self._satellite, carried)
+        except (OSError, ValueError, OrbitError) as error:
             if not self._has_failed:
                 self._has_failed = True
                 structlog.get_logger("carry_over").warning(
@@ -119,7 +93,7 @@ class FitKeeper:
                 )
 
 
-def _to_json(satellite: str, carried: CarryOver) -> dict[str, Any]:
+def to_json(satellite: str, carried: CarryOver) -> dict[str, Any]:
     return {
         "version": VERSION,
         "satellite": satellite,
@@ -140,7 +114,7 @@ def _to_json(satellite: str, carried: CarryOver) -> dict[str, Any]:
     }
 
 
-def _from_json(read: Any) -> CarryOver:
+def from_json(read: Any) -> CarryOver:
     """Raises: ValueError, TypeError, KeyError: what is wrong."""
     if not isinstance(read, dict) or read.get("version") != VERSION:
         raise ValueError(f"expected a JSON object with version {VERSION}")

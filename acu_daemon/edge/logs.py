@@ -1,13 +1,14 @@
 """structlog: JSON lines to standard output for a service, readable lines for a terminal.  Changes, not ticks."""
 
-import contextlib
 import logging
 import sys
 from collections.abc import Callable, MutableMapping
+from functools import partial
 from typing import Any
 
 import structlog
 
+from acu_daemon.edge.writer import Writer, write_text
 from acu_daemon.orbit.timescales import utc_text
 
 Entry = MutableMapping[str, Any]
@@ -19,11 +20,12 @@ def configure_logs(
     tags: dict[str, Any],
     is_terminal: bool,
     before_line: Callable[[], None] | None = None,
+    writer: Writer | None = None,
 ) -> None:
     """Set up the logs once.
 
     now_tai_s stamps every line with the daemon's own UTC; tags (SIMULATION, REHEARSAL) stand on every line; before_line
-    clears the live line of a terminal first.
+    clears the live line of a terminal first; writer prints the lines beside the loop.
     """
 
     def stamp(_logger: Any, _name: str, entry: Entry) -> Entry:
@@ -38,18 +40,27 @@ def configure_logs(
     structlog.configure(
         processors=[structlog.processors.add_log_level, stamp, render],
         wrapper_class=structlog.make_filtering_bound_logger(logging.INFO),
-        logger_factory=_OutputFactory(),
+        logger_factory=_OutputFactory(writer),
         cache_logger_on_first_use=False,
     )
+
+
+def tell_dropped(count: int) -> None:
+    """Say that lines are missing from the log."""
+    structlog.get_logger("log").warning("log.dropped", count=count, reason="the log's reader did not keep up")
 
 
 class _Output:
     """Prints lines to standard output.  A reader that went away, or a full disk, costs the line and never the pass."""
 
+    def __init__(self, writer: Writer | None) -> None:
+        self._writer = writer
+
     def msg(self, line: str) -> None:
-        with contextlib.suppress(OSError, ValueError, AttributeError):
-            sys.stdout.write(line + "\n")
-            sys.stdout.flush()
+        if self._writer is None:
+            write_text(sys.stdout, line + "\n")
+        else:
+            self._writer.put(partial(write_text, sys.stdout, line + "\n"))
 
     debug = info = warning = error = critical = msg
 
@@ -57,8 +68,11 @@ class _Output:
 class _OutputFactory:
     """Makes the one output; the names that loggers are asked for are not printed."""
 
+    def __init__(self, writer: Writer | None) -> None:
+        self._output = _Output(writer)
+
     def __call__(self, *_names: Any) -> _Output:
-        return _Output()
+        return self._output
 
 
 def _readable(level: str, entry: Entry) -> str:

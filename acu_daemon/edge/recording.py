@@ -2,35 +2,63 @@
 
 import contextlib
 import math
+import os
+import stat
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 import structlog
 
+from acu_daemon.edge.writer import Writer
 from acu_daemon.errors import UsageError
 from acu_daemon.model import Reading
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 
 HEADER = ["utc", "az_deg", "el_deg", "locked"]
+SYNC_S = 1.0  # a line is on the disk no later than this after its reading, while readings come
+_HEADER_LINE = ",".join(HEADER) + "\n"
+_TAIL_BYTES = 4096  # the last line lies within
 
 
 class RecordingWriter:
-    """Writes readings to a CSV file; every line is complete, and flushed at least once a second.
+    """Adds readings to a CSV file, whole lines only, each at once, synced to the disk once a second.
 
-    A write that fails (a full disk) ends the recording, with a log line, and never the pass.
+    With a writer the loop never waits for the disk.  Where a write fails (a full disk) lines are left out until one
+    succeeds again, with a log line at each edge; a failed write never stops a pass.  A recording that exists already is
+    continued, as after a restart.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, writer: Writer | None = None, now_tai_s: float = math.inf) -> None:
+        """Open the file.  UsageError: it cannot be, or holds something else, or readings later than now_tai_s."""
+        self._path = path
+        self._writer = writer
         try:
-            self._file = path.open("w", encoding="ascii", newline="")
+            self._fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
         except OSError as error:
             raise UsageError(f"--record {path}: {error.strerror}") from None
-        self._path = path
-        self._last_us = -math.inf
-        self._flushed_tai_s = -math.inf
-        self.has_failed = False
-        self._try(self._file.write, ",".join(HEADER) + "\n")
+        try:
+            self._is_file = stat.S_ISREG(os.fstat(self._fd).st_mode)
+            last_tai_s = self._continue(now_tai_s) if self._is_file else None
+        except BaseException:
+            os.close(self._fd)
+            raise
+        self._last_us = -math.inf if last_tai_s is None else round(last_tai_s * 1e6)
+        self._synced_tai_s = -math.inf
+        self._lost_count = 0
+        self._has_header = self._is_file and os.fstat(self._fd).st_size > 0
+        self._log: Any = structlog.get_logger("record")
+        if not self._has_header:
+            with contextlib.suppress(OSError):  # the first reading tries again
+                self._append(_HEADER_LINE)
+                self._has_header = True
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether the newest line could not be written."""
+        return self._lost_count > 0
 
     def add(self, reading: Reading) -> None:
         """Write one reading; a reading not later than the one before is left out, since times must rise."""
@@ -39,19 +67,86 @@ class RecordingWriter:
             return
         self._last_us = time_us
         utc = utc_text(reading.tai_s, 6)
-        self._try(self._file.write, f"{utc},{reading.az_deg:.5f},{reading.el_deg:.5f},{int(reading.is_locked)}\n")
-        if reading.tai_s - self._flushed_tai_s >= 1.0:
-            self._flushed_tai_s = reading.tai_s
-            self._try(self._file.flush)
+        line = f"{utc},{reading.az_deg:.5f},{reading.el_deg:.5f},{int(reading.is_locked)}\n"
+        if self._writer is None:
+            self._write(line, reading.tai_s)
+        elif not self._writer.put(partial(self._write, line, reading.tai_s)):
+            self._lost_count += 1
 
-    def _try(self, action: Callable[..., object], *arguments: str) -> None:
-        if self.has_failed:
-            return
+    def _write(self, line: str, tai_s: float) -> None:
         try:
-            action(*arguments)
+            self._append(line if self._has_header else _HEADER_LINE + line)
+            if tai_s - self._synced_tai_s >= SYNC_S:
+                self._synced_tai_s = tai_s
+                self._sync()
         except OSError as error:
-            self.has_failed = True
-            structlog.get_logger("record").warning("record.failed", file=str(self._path), reason=error.strerror)
+            if not self._lost_count:
+                self._log.warning("record.failed", file=str(self._path), reason=error.strerror)
+            self._lost_count += 1
+            return
+        self._has_header = True
+        if self._lost_count:
+            self._log.info("record.resumed", file=str(self._path), lost_count=self._lost_count)
+            self._lost_count = 0
+
+    def _append(self, text: str) -> None:
+        """Append whole lines, or nothing.  OSError: nothing."""
+        data = text.encode("ascii")
+        size = os.fstat(self._fd).st_size
+        try:
+            written = os.write(self._fd, data)
+            if written < len(data):
+                os.write(self._fd, data[written:])  # says why
+        except OSError:
+            if self._is_file:
+                os.ftruncate(self._fd, size)
+            raise
+
+    def _sync(self) -> None:
+        if self._is_file:
+            os.fdatasync(self._fd)
+
+    def _continue(self, now_tai_s: float) -> float | None:
+        """Check what the file holds, cut a torn last line off, and return the time of its last reading."""
+        size = os.fstat(self._fd).st_size
+        head = os.pread(self._fd, len(_HEADER_LINE) + 4, 0).decode("ascii", "replace").replace("\r", "")
+        if not head.startswith(_HEADER_LINE):
+            if _HEADER_LINE.startswith(head):  # empty, or torn in its first line
+                os.ftruncate(self._fd, 0)
+                return None
+            raise UsageError(
+                f"--record {self._path}: this file is no recording and is left alone: choose another, or move it away"
+            )
+        tail = os.pread(self._fd, _TAIL_BYTES, max(0, size - _TAIL_BYTES))
+        whole, _, torn = tail.rpartition(b"\n")
+        if torn:
+            os.ftruncate(self._fd, size - len(torn))
+            structlog.get_logger("record").warning("record.torn", file=str(self._path), bytes=len(torn))
+        last = whole.rpartition(b"\n")[2].decode("ascii", "replace")
+        if last.rstrip() == ",".join(HEADER):
+            return None
+        try:
+            _, _, last_tai_s = _row(last.split(","))
+        except ValueError as error:
+            raise UsageError(f"--record {self._path}: its last line is no reading ({error}): choose another") from None
+        if last_tai_s > now_tai_s:
+            raise UsageError(
+                f"--record {self._path}: its last reading, {utc_text(last_tai_s, 0)}, is later than now, "
+                f"{utc_text(now_tai_s, 0)}, and times must rise: choose another, or move it away"
+            )
+        return last_tai_s
+
+    def close(self) -> None:
+        """Sync and close, after what still waits; with a writer it is done when that is closed."""
+        if self._writer is None:
+            self._close()
+        else:
+            self._writer.put(self._close)
+
+    def _close(self) -> None:
+        with contextlib.suppress(OSError):  # of a failed recording
+            self._sync()
+        os.close(self._fd)
 
     def __enter__(self) -> "RecordingWriter":
         return self
@@ -59,14 +154,14 @@ class RecordingWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._try(self._file.flush)
-        with contextlib.suppress(OSError):  # of a failed recording: what is still buffered cannot be written either
-            self._file.close()
+        self.close()
 
 
-def read_readings(path: Path) -> list[tuple[str, Reading | None, float]]:
+def read_readings(path: Path, warn: Callable[[str], None] = lambda _: None) -> list[tuple[str, Reading | None, float]]:
     """Read a readings CSV: for each line its UTC text, the reading (None where the angles are empty), and its TAI.
 
+    A last line that lacks its end and makes no sense was torn, as by a loss of power: `warn` is told, and it is left
+    out.
     Raises: UsageError: names file, line and what was expected.
     """
     try:
@@ -84,6 +179,9 @@ def read_readings(path: Path) -> list[tuple[str, Reading | None, float]]:
         try:
             utc, reading, tai_s = _row(line.split(","))
         except ValueError as error:
+            if number == len(lines) + 1:  # no line end after it
+                warn(f"{path}, line {number}: torn, and left out")
+                break
             raise UsageError(f"{path}, line {number}: {error}") from None
         if result and tai_s <= result[-1][2]:
             raise UsageError(f"{path}, line {number}: {utc} is not later than the line before; times must rise")

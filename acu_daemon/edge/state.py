@@ -2,10 +2,16 @@
 
 import json
 import os
+import stat
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
+from acu_daemon.edge.writer import Latest, Writer
 from acu_daemon.errors import UsageError
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 
 def state_directory(asked: Path | None, *, is_rehearsal: bool) -> Path:
@@ -16,7 +22,18 @@ def state_directory(asked: Path | None, *, is_rehearsal: bool) -> Path:
         directory.mkdir(mode=0o750, parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"state directory {directory}: {error.strerror}; choose another with --state DIR") from None
+    refuse_world_writable(directory)
     return directory
+
+
+def refuse_world_writable(directory: Path) -> None:
+    """UsageError: everybody may put files into a directory that decides how the antenna moves."""
+    try:
+        is_open = bool(directory.stat().st_mode & stat.S_IWOTH)
+    except OSError:  # whoever reads its files says so
+        return
+    if is_open:
+        raise UsageError(f"{directory}: everybody may write there; close it: chmod o-w {directory}")
 
 
 def _default() -> Path:
@@ -36,20 +53,24 @@ EVERY_TICKS = 10
 
 
 class SnapshotFile:
-    """The daemon's present view, once a second, for health checks and scripts.  A failed write never stops a tick."""
+    """The daemon's present view, once a second, for health checks and scripts.  The loop never waits for the disk."""
 
-    def __init__(self, directory: Path) -> None:
+    def __init__(self, directory: Path, writer: Writer) -> None:
         self._path = directory / SNAPSHOT
         self._unfinished = directory / f".{SNAPSHOT}.{os.getpid()}"
+        self._latest: Latest[DataclassInstance] = Latest(writer, self._save)
         self._skip = 0
         self.failed_count = 0
 
-    def write(self, values: dict[str, Any]) -> None:
+    def write(self, seen: "DataclassInstance") -> None:
+        """Take the snapshot of a tick."""
         self._skip = (self._skip + 1) % EVERY_TICKS
-        if self._skip:
-            return
+        if self._skip == 0:
+            self._latest.offer(seen)
+
+    def _save(self, seen: "DataclassInstance") -> None:
         try:
-            self._unfinished.write_text(json.dumps(values), encoding="utf-8")
+            self._unfinished.write_text(json.dumps(asdict(seen)), encoding="utf-8")
             self._unfinished.replace(self._path)
         except OSError:
             self.failed_count += 1

@@ -1,0 +1,155 @@
+"""Threads for what may wait on a disk or on a reader: log lines and files.  The loop never waits for them."""
+
+import contextlib
+import os
+import threading
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Generic, TextIO, TypeVar
+
+import structlog
+
+Job = Callable[[], None]
+Value = TypeVar("Value")
+LIMIT = 1000
+CLOSE_S = 2.0
+LIVE_LIMIT = 20  # a live line is not drawn while so much waits before it
+
+
+class Writer:
+    """Does jobs in a thread of its own, in order.  A job that finds the queue full is dropped and counted.
+
+    on_drained: told, in the thread, how many jobs were dropped since it was told last, once the queue is empty again.
+    """
+
+    def __init__(self, name: str, limit: int = LIMIT, on_drained: Callable[[int], None] | None = None) -> None:
+        self._limit = limit
+        self._on_drained = on_drained
+        self._jobs: SimpleQueue[Job | None] = SimpleQueue()
+        self._is_closed = False
+        self._told_count = 0
+        self.dropped_count = 0
+        self._thread = threading.Thread(target=self._work, name=name, daemon=True)  # a stuck one holds no exit up
+        self._thread.start()
+
+    @property
+    def waiting_count(self) -> int:
+        return self._jobs.qsize()
+
+    def put(self, job: Job) -> bool:
+        """Have a job done; never waits.  False: dropped.
+
+        What a job puts itself is done at once, and so is what comes after `close`, unless the thread is stuck.
+        """
+        if threading.current_thread() is self._thread or (self._is_closed and not self._thread.is_alive()):
+            job()
+            return True
+        if self._is_closed or self._jobs.qsize() >= self._limit:
+            self.dropped_count += 1
+            return False
+        self._jobs.put(job)
+        return True
+
+    def close(self, timeout_s: float = CLOSE_S) -> bool:
+        """Wait until all is done, but no longer than this.  True: it is."""
+        if not self._is_closed:
+            self._is_closed = True
+            self._jobs.put(None)
+        self._thread.join(timeout_s)
+        return not self._thread.is_alive()
+
+    def _work(self) -> None:
+        while (job := self._jobs.get()) is not None:
+            try:
+                job()
+            except Exception as error:  # noqa: BLE001  one bad job must not end all others
+                structlog.get_logger("writer").error("writer.failed", reason=f"{type(error).__name__}: {error}")
+            if self._jobs.empty():
+                self._tell()
+        self._tell()
+
+    def _tell(self) -> None:
+        dropped_count = self.dropped_count - self._told_count
+        if dropped_count and self._on_drained is not None:
+            self._told_count += dropped_count
+            self._on_drained(dropped_count)
+
+
+class Latest(Generic[Value]):
+    """Saves the newest of the values offered; what comes while an older one waits for the thread replaces it."""
+
+    def __init__(self, writer: Writer, save: Callable[[Value], None]) -> None:
+        self._writer = writer
+        self._save = save
+        self._newest: list[Value] = []
+        self._is_waiting = False
+
+    def offer(self, value: Value) -> None:
+        """Take a value; never waits."""
+        self._newest = [value]
+        if not self._is_waiting:
+            self._is_waiting = True
+            self._is_waiting = self._writer.put(self._work)
+
+    def _work(self) -> None:
+        self._is_waiting = False
+        newest, self._newest = self._newest, []
+        for value in newest:
+            self._save(value)
+
+
+class QueuedStream:
+    """A text stream whose writes go through a writer, in order with its other jobs; too many waiting are left out."""
+
+    def __init__(self, stream: TextIO, writer: Writer) -> None:
+        self._stream = stream
+        self._writer = writer
+
+    def write(self, text: str) -> None:
+        if self._writer.waiting_count < LIVE_LIMIT:
+            self._writer.put(partial(write_text, self._stream, text))
+
+    def flush(self) -> None:
+        """Each write is flushed."""
+
+
+def write_text(stream: TextIO | None, text: str) -> None:
+    """Write past the stream's buffer where it has a descriptor.  A reader that has gone costs the text, no more.
+
+    A thread that is stuck in a stream's buffer would hold the lock that the end of the process wants.
+    """
+    if stream is None:
+        return
+    try:
+        fd = stream.fileno()
+    except (OSError, ValueError, AttributeError):  # one that lives in memory
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            stream.write(text)
+            stream.flush()
+        return
+    data = text.encode("utf-8", "backslashreplace")
+    with contextlib.suppress(OSError):
+        while data:
+            data = data[os.write(fd, data) :]
+
+
+def replace_file(path: Path, data: bytes) -> None:
+    """Put a file in place, whole: written beside it, on the disk, renamed.  OSError: it cannot be."""
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        with unfinished.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        unfinished.replace(path)
+    except OSError:
+        with contextlib.suppress(OSError):
+            unfinished.unlink()
+        raise
+    directory = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(directory)
+    finally:
+        os.close(directory)
