@@ -10,6 +10,7 @@ import structlog
 
 from acu_daemon.assist.gate import Dwell
 from acu_daemon.control.causes import LINK_SILENCE_S, is_acquired
+from acu_daemon.control.doubt import Doubt
 from acu_daemon.control.state import ControlConfig, Event, Exchange, Observation
 from acu_daemon.control.states import AUTOTRACKING
 from acu_daemon.control.tick import tick
@@ -35,6 +36,7 @@ from acu_daemon.protocol.messages import (
 )
 
 CLOCK_STEP_S = 0.1
+DOUBT_EVERY_S = 1.0
 LATENESS_KEPT = 36000  # an hour of ticks
 
 
@@ -58,6 +60,8 @@ class Foreground:
         self._after_tick = after_tick
         self._on_reading = on_reading
         self._dwell = Dwell(config.lock_dwell_s)
+        self._doubt = Doubt(config.azimuth, config.elevation)
+        self._doubt_again_s = -math.inf
         self._seen = Observation()
         self._log: Any = structlog.get_logger("tick")
         self.identity: Identity | None = None
@@ -145,6 +149,9 @@ class Foreground:
         sample_tai_s = answer.started_tai_s + delay_s
         if answer.first_byte_tai_s is not None:
             sample_tai_s = min(sample_tai_s, answer.first_byte_tai_s)
+        if not self._doubt.believes(status, sample_tai_s):
+            self._report_doubt(status)
+            return
         reading = Reading(sample_tai_s, status.az_deg, status.el_deg, is_acquired(status), status.agc_db)
         self._seen = replace(self._seen, status=status, reading=reading)
         if self._dwell.is_locked(reading) and self._area.state.track in AUTOTRACKING:
@@ -152,6 +159,14 @@ class Foreground:
         self._area.dwell_count = self._dwell.rejected_count
         if self._on_reading is not None:
             self._on_reading(reading)
+
+    def _report_doubt(self, status: Status) -> None:
+        """Say it once a second at most: a bad line garbles often."""
+        now_s = self._clock.monotonic_s()
+        if now_s >= self._doubt_again_s:
+            self._doubt_again_s = now_s + DOUBT_EVERY_S
+            doubt = self._doubt
+            self._log.warning("acu.doubted", reason=doubt.reason, mode=status.mode.name, count=doubt.count)
 
     def _report(self, events: tuple[Event, ...]) -> None:
         for event in events:

@@ -88,8 +88,8 @@ def _axis(change: Callable[[Axis, AxisTrouble, Fault], None]) -> Act:
     return act
 
 
-def _stop_here(axis: Axis, trouble: AxisTrouble, _fault: Fault) -> None:
-    if axis.rate_deg_s >= 0.0:
+def _stop_here(axis: Axis, trouble: AxisTrouble, fault: Fault) -> None:
+    if fault.amount > 0.0:
         trouble.upper_stop_deg = axis.angle_deg
     else:
         trouble.lower_stop_deg = axis.angle_deg

@@ -71,7 +71,7 @@ VERBS: dict[VerbName, Verb] = {
     "power-cycle": Verb("pedestal", "lasts", "the ACU is off, then starts: registers, mode, backup, W are forgotten"),
     "local-panel": Verb("pedestal", "lasts", "a person at the panel takes control"),
     "emergency-stop": Verb("pedestal", "lasts", "the button is pressed; in the end released, the fault reset by hand"),
-    "limit-switch": Verb("pedestal", "lasts", "a limit switch trips where the axis stands: no motion past it"),
+    "limit-switch": Verb("pedestal", "lasts", "a limit switch trips where the axis stands", 1, "(CW, up) or -1", 1.0),
     "stuck": Verb("pedestal", "lasts", "the axis does not move"),
     "runaway": Verb("pedestal", "lasts", "the axis runs at this rate while it is driven", 3.0, "deg/s"),
     "slow-drive": Verb("pedestal", "lasts", "the axis has only this share of its rate", 0.2, "of 1", 1.0),

@@ -32,7 +32,7 @@ def _bad_checksum(frame: bytes, _value: float, random: Random) -> bytes:
     return frame[:-1] + bytes((frame[-1] ^ random.randint(1, 127),))
 
 
-def _is_likely(data: bytes) -> bool:
+def _is_likely(data: bytes | bytearray) -> bool:
     return all(c in (HEX_DIGITS if i < ANGLES_CHARS else NIBBLES) for i, c in enumerate(data))
 
 

@@ -8,10 +8,11 @@ from acu_daemon.errors import LinkError, LinkRefusedError
 from acu_daemon.protocol.frame import MAX_DATA_BYTES
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.fault_board import FaultBoard
-from acu_daemon.sim.fault_verbs import Fault
+from acu_daemon.sim.fault_verbs import Fault, VerbName
 from acu_daemon.sim.line import AcuLine
 
 SERIAL_GAP_S = 0.010
+HELD = "another client holds the ACU"
 
 
 class MemoryLink:
@@ -48,13 +49,13 @@ class MemoryLink:
         elif fault.verb in ("reset", "second-client", "unplug") and is_on and self._line is not None:
             self.hang_up()
 
-    def _suffers(self, *verbs: str) -> bool:
+    def _suffers(self, *verbs: VerbName) -> bool:
         return self._board is not None and any(self._board.is_on(verb) for verb in verbs)
 
     async def open(self) -> None:
         """Open.  LinkRefusedError: is_refused."""
         if self.is_refused:
-            raise LinkRefusedError(f"{self.description}: another client holds the ACU")
+            raise LinkRefusedError(f"{self.description}: {HELD}")
         if self._suffers("refuse"):
             raise LinkRefusedError(f"nobody listens at {self.description}")
         if self._suffers("unplug"):
@@ -72,9 +73,7 @@ class MemoryLink:
         is_taken = asyncio.get_running_loop().time() < self._taken_until_s
         if is_taken or self._suffers("accept-then-close", "second-client"):
             self._line.close()
-            self._arrivals.fail(
-                LinkRefusedError(f"{self.description} was closed at once: another client holds the ACU")
-            )
+            self._arrivals.fail(LinkRefusedError(f"{self.description} was closed at once: {HELD}"))
 
     def hang_up(self) -> None:
         """The far side closes."""
