@@ -1,0 +1,166 @@
+"""The service as systemd runs it: the unit file's own commands under a small supervisor, real processes."""
+
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from script_modules import load
+from supervisor import UNIT, Supervisor, read_unit
+
+from acu_daemon.cli.safe_stop import why_not
+from acu_daemon.protocol.messages import AcuMode
+from acu_daemon.report.trace import read_trace
+
+pass_rig = load("pass_rig")
+realtime = pytest.mark.realtime
+PATIENCE_S = 60.0
+HANGS = """
+import sys, time
+from acu_daemon.daemon.foreground import Foreground
+from acu_daemon.cli import main
+tick = Foreground._tick
+async def hang(self):
+    if self.tick_count == 30:
+        a_loop_that_hangs()
+    await tick(self)
+def a_loop_that_hangs():
+    time.sleep(1000)
+Foreground._tick = hang
+sys.argv[0] = "acu-daemon"
+main()
+"""
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Iterator[Any]:
+    scene = pass_rig.make_scene(tmp_path / "scene", None, 120.0)
+    with pass_rig.rigs(scene, ["tcp"], tmp_path) as made:
+        made[0].start_acu()
+        yield made[0]
+
+
+def service(rig: Any, directory: Path, **overrides: str) -> Supervisor:
+    """The unit, rehearsing on the rig's simulated ACU."""
+    environment = {"ACU_CONFIG": str(rig.config)}
+    clock = rig.arguments("run")[-4:]
+    return Supervisor(directory, rig.scene.satellite, environment, clock, **overrides)
+
+
+def wait_until(is_so: Callable[[], bool]) -> None:
+    end_s = time.monotonic() + PATIENCE_S
+    while not is_so():
+        assert time.monotonic() < end_s, "it never came true"
+        time.sleep(0.05)
+
+
+def modes_of(rig: Any) -> list[AcuMode]:
+    """What the antenna did, once the simulated ACU has written it all down."""
+    rig.stop()
+    return [AcuMode[name] for name in read_trace(rig.trace).mode]
+
+
+# the unit file
+
+
+@pytest.fixture
+def unit(tmp_path: Path) -> Path:
+    if shutil.which("systemd-analyze") is None:
+        pytest.skip("systemd-analyze is not installed")
+    path = tmp_path / "acu-daemon@station.service"
+    path.write_text(UNIT.read_text())
+    return path
+
+
+def test_systemd_finds_nothing_wrong_with_the_unit(unit: Path) -> None:
+    done = subprocess.run(["systemd-analyze", "verify", unit], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_the_unit_is_exposed_by_no_more_than_1_5(unit: Path) -> None:
+    asked = ["systemd-analyze", "security", "--offline=true", "--threshold=15", unit]
+    done = subprocess.run(asked, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+
+
+def test_the_unit_restarts_for_ever_but_not_after_a_refused_configuration() -> None:
+    directives = read_unit()
+    assert directives["Restart"] == ["always"]
+    assert directives["StartLimitIntervalSec"] == ["0"]
+    assert directives["RestartPreventExitStatus"] == ["2"]
+
+
+# when the antenna is stopped from outside
+
+
+def test_a_crash_between_two_runs_is_no_reason_to_stop_the_antenna(tmp_path: Path) -> None:
+    assert "started again" in why_not({"SERVICE_RESULT": "signal", "RUNTIME_DIRECTORY": str(tmp_path)})
+    assert "by itself" in why_not({"SERVICE_RESULT": "success", "RUNTIME_DIRECTORY": str(tmp_path)})
+
+
+def test_a_final_stop_that_the_daemon_did_not_survive_is_one(tmp_path: Path) -> None:
+    (tmp_path / "final").touch()
+    assert why_not({"SERVICE_RESULT": "timeout", "RUNTIME_DIRECTORY": str(tmp_path)}) == ""
+    assert why_not({"SERVICE_RESULT": "success", "RUNTIME_DIRECTORY": str(tmp_path)}) != ""
+
+
+# P4, real processes
+
+
+@realtime
+def test_p4_a_killed_daemon_is_back_and_its_antenna_autotracked_all_the_while(rig: Any, tmp_path: Path) -> None:
+    with service(rig, tmp_path) as running:
+        wait_until(lambda: any("AUTOTRACK/FITTED" in status for status in running.statuses))
+        before_count = len(running.statuses)
+        assert running.process is not None
+        running.process.kill()
+        wait_until(lambda: any("AUTOTRACK/FITTED" in status for status in running.statuses[before_count:]))
+        running.stop()
+    assert running.results == ["signal", "success"]
+    assert running.ready_count == 2
+    assert all(status.startswith("REHEARSAL") for status in running.statuses)
+    journal = running.journal.read_text()
+    assert "a stop would end an autotrack" in journal
+    assert "the daemon ended by itself and stopped the antenna" in journal
+    modes = modes_of(rig)
+    first, last = modes.index(AcuMode.AUTOTRACK), len(modes) - modes[::-1].index(AcuMode.AUTOTRACK)
+    assert set(modes[first:last]) == {AcuMode.AUTOTRACK}
+    assert modes[-1] is AcuMode.STANDBY
+
+
+@realtime
+def test_p4_a_hung_loop_is_aborted_with_its_stack_and_started_again(rig: Any, tmp_path: Path) -> None:
+    hanging = tmp_path / "hang.py"
+    hanging.write_text(HANGS)
+    start = f"/usr/bin/env python {hanging} run --config ${{ACU_CONFIG}} --satellite ${{ACU_SATELLITE}}"
+    with service(rig, tmp_path, ExecStart=start) as running:
+        wait_until(lambda: len(running.starts_s) > 1)
+        running.stop()
+    assert running.results[0] == "watchdog"
+    assert "a_loop_that_hangs" in running.journal.read_text()
+
+
+@realtime
+def test_p4_a_final_stop_reaches_the_antenna_though_the_daemon_is_dead(rig: Any, tmp_path: Path) -> None:
+    with service(rig, tmp_path, WatchdogSec="1000s", TimeoutStopSec="1s") as running:
+        wait_until(lambda: any("AUTOTRACK" in status for status in running.statuses))
+        assert running.process is not None
+        running.process.send_signal(signal.SIGSTOP)
+        running.stop()
+    assert running.results == ["timeout"]
+    assert running.post_codes == [0]
+    assert modes_of(rig)[-1] is AcuMode.STANDBY
+
+
+@realtime
+def test_a_refused_configuration_is_not_started_again(rig: Any, tmp_path: Path) -> None:
+    (rig.config / "station.toml").write_text("[station]\n")
+    with service(rig, tmp_path) as running:
+        wait_until(lambda: bool(running.results))
+        time.sleep(1.0)
+    assert running.results == ["exit-code"]
+    assert len(running.starts_s) == 1
