@@ -208,6 +208,19 @@ def test_the_result_does_not_depend_on_how_the_readings_are_cut():
     assert in_parts.reading_count == at_once.reading_count
 
 
+def test_elements_300_km_off_are_found_from_half_a_pass_at_once():
+    """Overhead, where the first guess is tens of degrees beside the readings and must not pass for noise."""
+    source, where = circular(82.0, 0.001, 6888.0), site(-0.7, -8.0)
+    truth = source.corrected(replace(TRUE, delta_mean_anomaly_rad=-2.4 * DEG))
+    tai_s = visible(truth, where, 1.0)
+    az_deg, el_deg = _shown(truth, where, tai_s)
+    half = tai_s.size // 2
+    readings = _part(noisy(az_deg, el_deg, tai_s, SIGMA_DEG, np.random.default_rng(8)), 0, half)
+    fit = _fit(source, where, readings)
+    assert _errors_deg(source, where, fit, tai_s, az_deg, el_deg)[half:].max() < WORST_REAL_DEG
+    assert fit.reading_count == np.count_nonzero(readings.el_deg <= SETTINGS.max_fit_elevation_deg)
+
+
 def test_a_bias_of_the_encoders_goes_into_the_commands():
     source, where = circular(66.0, 0.001), site(4.0)
     truth = source.corrected(TRUE)

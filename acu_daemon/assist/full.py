@@ -9,12 +9,14 @@ from acu_daemon.assist.full_solve import Problem, Solution, solve
 from acu_daemon.assist.full_states import Prior, bias_of, correction_of, make_prior, shift_of
 from acu_daemon.assist.innovation import DENIED_S, WIDEST_SIGMAS, Denial
 from acu_daemon.assist.settings import EstimatorSettings
+from acu_daemon.assist.widening import WIDTHS, is_strained, most_likely
 from acu_daemon.model import Correction, FitResult, Readings, Site
 from acu_daemon.orbit.frames import station_itrs_m, teme_from_itrs
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import DEG
 
 _NEWEST_COUNT = 30
+_RETRY_SHARE = 1.3  # so many more readings until another widening is tried
 
 
 class FullEstimator(BaseEstimator):
@@ -23,9 +25,19 @@ class FullEstimator(BaseEstimator):
     name = "full"
 
     def __init__(
-        self, propagator: Propagator, site: Site, settings: EstimatorSettings, carried: CarryOver | None = None
+        self,
+        propagator: Propagator,
+        site: Site,
+        settings: EstimatorSettings,
+        carried: CarryOver | None = None,
+        *,
+        may_widen: bool = False,
     ) -> None:
-        """Take what an earlier pass left; it is dropped, with a note, when a minute of readings denies it."""
+        """Take what an earlier pass left; it is dropped, with a note, when a minute of readings denies it.
+
+        may_widen: elements are worth less, with a note, when the readings show them to be far worse than they should
+        be; only for readings that are known to be the satellite's.
+        """
         super().__init__(propagator, site, settings)
         self._carried = carried
         self._denial: Denial | None = None
@@ -33,6 +45,9 @@ class FullEstimator(BaseEstimator):
         self._parts: list[Sights] = []
         self._solution: Solution | None = None
         self._is_new = False
+        self._may_widen = may_widen
+        self._width = 0  # of widening.WIDTHS
+        self._next_try_count = 0
 
     def _use(self, readings: Readings) -> list[str | None]:
         seen = sights(readings)
@@ -74,12 +89,28 @@ class FullEstimator(BaseEstimator):
         seen = _joined(self._parts)
         self._parts = [seen]
         if self._is_new or self._solution is None:
-            self._solution = solve(self._problem, seen, self._solution)
+            self._solution = self._solve(self._problem, seen)
             self._is_new = False
         return self._result(self._solution, float(seen.tai_s[-1]))
 
+    def _solve(self, problem: Problem, seen: Sights) -> Solution:
+        given = WIDTHS[self._width].of(problem)
+        solution = solve(given, seen, self._solution)
+        may_widen = self._may_widen and self._carried is None and seen.tai_s.size >= self._next_try_count
+        if not may_widen or not is_strained(given, solution):
+            return solution
+        self._next_try_count = int(_RETRY_SHARE * seen.tai_s.size)
+        solution, width = most_likely(problem, self._width, seen, solution)
+        if width > self._width:
+            self._width = width
+            self.notes.append(
+                "the satellite is farther from its elements than their sigmas allow, which are widened for this pass; "
+                "fetch newer elements, or say in [uncertainty] what they are worth"
+            )
+        return solution
+
     def _result(self, solution: Solution, at_tai_s: float) -> FitResult:
-        left_out = int(np.count_nonzero(solution.weights == 0.0))
+        left_out = int(np.count_nonzero(solution.left.weights == 0.0))
         newest = solution.left.off_rad[-_NEWEST_COUNT:]
         correction = correction_of(solution.x)
         along_s, across_deg = shift_for_people(self._source, correction, at_tai_s, self._site)

@@ -18,6 +18,7 @@ _HUBER, _LAST_SIGMAS = 3.0, 10.0  # of both components together; from the first 
 _FALL_FROM = 6.0
 _NOISE_WORTH_COUNT = 30.0  # the configured noise counts like so many readings against the noise seen
 _SIGMA_PER_MEDIAN = 1.4826  # of the absolute value, Gaussian
+_MOST_NOISE = 10.0  # times the configured one; residuals beyond are of a path not found yet, and do not yield to the prior
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,11 +43,13 @@ class Residuals:
     """Readings minus what the states give, across and in elevation, (N, 2), rad.
 
     noise_rad: 1 sigma, (N, 2), the configured one x noise_scale (2,), by how much the readings differ from it.
+    weights: robust ones, (N,), by the noise seen.
     """
 
     off_rad: Array
     noise_rad: Array
     noise_scale: Array
+    weights: Array
 
 
 def residuals(path: Curve, here: Site, x: Array, settings: EstimatorSettings, seen: Sights) -> Residuals:
@@ -63,7 +66,7 @@ def residuals(path: Curve, here: Site, x: Array, settings: EstimatorSettings, se
     sigma[:, 0] = settings.sigma_azimuth_deg * DEG
     sigma[:, 1] = (settings.sigma_elevation_deg + settings.sigma_elevation_cot_deg * cot) * DEG
     scale = _noise_scale(off / sigma)
-    return Residuals(off, sigma * scale, scale)
+    return Residuals(off, sigma * np.minimum(scale, _MOST_NOISE), scale, robust_weights(off / (sigma * scale)))
 
 
 def _noise_scale(sigmas_off: Array) -> Array:
@@ -97,9 +100,9 @@ def seconds_of(tai_s: Array) -> Indices:
     return np.flatnonzero(np.diff(np.floor(tai_s / NORMAL_POINT_S), prepend=-np.inf))
 
 
-def normal_points(tai_s: Array, seen: Residuals, weights: Array, starts: Indices) -> Points:
+def normal_points(tai_s: Array, seen: Residuals, starts: Indices) -> Points:
     """Average each second's readings; a second without weight gets the mean of its times and no weight."""
-    heavy = weights + 1e-12
+    heavy = seen.weights + 1e-12
     total = np.add.reduceat(heavy, starts)
     since = tai_s - np.repeat(tai_s[starts], np.diff(starts, append=tai_s.size))
     at = tai_s[starts] + np.add.reduceat(heavy * since, starts) / total

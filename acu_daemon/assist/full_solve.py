@@ -15,7 +15,6 @@ from acu_daemon.assist.full_points import (
     Sights,
     normal_points,
     residuals,
-    robust_weights,
     seconds_of,
 )
 from acu_daemon.assist.full_states import STATION, Prior
@@ -27,6 +26,7 @@ from acu_daemon.units import Array
 _MAX_SWEEPS = 15
 _CONVERGED_RAD = 1e-7  # on the sky
 _STALE_RAD = 3e-4  # partials from a path this far away only slow the sweeps down
+_FIRST_S = 60.0
 _DOUBTFUL_SHARE = 0.05  # of the weight lost to outliers: then the readings are solved from the prior too
 
 
@@ -50,29 +50,33 @@ class Partials:
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """States, their covariance (13, 13), and what the readings left and weigh, (N,)."""
+    """States, their covariance (13, 13), and what the readings left."""
 
     x: Array
     covariance: Array
     left: Residuals
-    weights: Array
     partials: Partials
 
 
 def solve(problem: Problem, seen: Sights, before: Solution | None) -> Solution:
     """Find the most likely states.  before: where to start from, such as the solution with fewer readings.
 
+    Without it the first minute comes first: at low elevation even elements hundreds of kilometres off are nearly linear.
     Where many readings look like outliers, the start may be to blame: of two starts the one with less noise counts.
 
     Raises:  OrbitError: the source has no answer for one of the times, or for the states on the way.
     """
-    if before is None:
-        return _sweep(problem, seen, problem.prior.mean, None)
-    warm = _sweep(problem, seen, before.x, before.partials)
-    if float(np.mean(warm.weights)) > 1.0 - _DOUBTFUL_SHARE:
+    start = before or _sweep(problem, _first_of(seen), problem.prior.mean, None)
+    warm = _sweep(problem, seen, start.x, start.partials)
+    if float(np.mean(warm.left.weights)) > 1.0 - _DOUBTFUL_SHARE:
         return warm
     cold = _sweep(problem, seen, problem.prior.mean, None)
     return min(warm, cold, key=lambda one: float(np.sum(one.left.noise_scale)))
+
+
+def _first_of(seen: Sights) -> Sights:
+    end = int(np.searchsorted(seen.tai_s, seen.tai_s[0] + _FIRST_S))
+    return Sights(seen.tai_s[:end], seen.across[:end], seen.upward[:end])
 
 
 def _sweep(problem: Problem, seen: Sights, x: Array, partials: Partials | None) -> Solution:
@@ -85,8 +89,7 @@ def _sweep(problem: Problem, seen: Sights, x: Array, partials: Partials | None) 
     for _ in range(_MAX_SWEEPS):
         path, here = path_itrs(problem.source, x, problem.site, nodes), site_of(problem.site, x)
         left = residuals(path, here, x, problem.settings, seen)
-        weights = robust_weights(left.off_rad / left.noise_rad)
-        points = normal_points(seen.tai_s, left, weights, starts)
+        points = normal_points(seen.tai_s, left, starts)
         h = sky_partials(path.at(points.tai_s), partials.curve.at(points.tai_s), here, has_shift)
         new, covariance = _step(problem.prior, root, x, h, points)
         step_rad = float(np.max(np.abs(np.tensordot(new - x, h, 1)), initial=0.0))
@@ -96,7 +99,7 @@ def _sweep(problem: Problem, seen: Sights, x: Array, partials: Partials | None) 
         partials.moved_rad += step_rad
         if partials.moved_rad > _STALE_RAD:
             partials = Partials(problem, x, nodes)
-    return Solution(x, covariance, left, weights, partials)
+    return Solution(x, covariance, left, partials)
 
 
 def _root(covariance: Array) -> Array:
