@@ -18,7 +18,7 @@ _HUBER, _LAST_SIGMAS = 3.0, 10.0  # of both components together; from the first 
 _FALL_FROM = 6.0
 _NOISE_WORTH_COUNT = 30.0  # the configured noise counts like so many readings against the noise seen
 _SIGMA_PER_MEDIAN = 1.4826  # of the absolute value, Gaussian
-_MOST_NOISE = 10.0  # times the configured one; residuals beyond are of a path not found yet, and do not yield to the prior
+_MOST_NOISE = 10.0  # times the configured one: beyond it the path is not found yet, and must not yield to the prior
 
 
 @dataclass(frozen=True, slots=True)

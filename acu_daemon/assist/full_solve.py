@@ -61,7 +61,7 @@ class Solution:
 def solve(problem: Problem, seen: Sights, before: Solution | None) -> Solution:
     """Find the most likely states.  before: where to start from, such as the solution with fewer readings.
 
-    Without it the first minute comes first: at low elevation even elements hundreds of kilometres off are nearly linear.
+    Without it the first minute comes first: at low elevation even elements hundreds of kilometres off are near linear.
     Where many readings look like outliers, the start may be to blame: of two starts the one with less noise counts.
 
     Raises:  OrbitError: the source has no answer for one of the times, or for the states on the way.
