@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -208,3 +209,19 @@ def test_the_loops_clock_keeps_virtual_time_through_a_leap_second() -> None:
 
 def test_the_kernel_says_whether_its_clock_is_synchronised() -> None:
     assert is_clock_synchronised() in (True, False)
+
+
+@pytest.mark.parametrize(("said", "is_synchronised"), [("yes", True), ("no", False), ("", None)])
+def test_where_the_kernel_may_not_be_asked_systemd_answers(
+    said: str, is_synchronised: bool | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Refusing:
+        def adjtimex(self, _: object) -> int:
+            return -1
+
+    systemd = tmp_path / "timedatectl"
+    systemd.write_text(f"#!/bin/sh\necho {said}\n")
+    systemd.chmod(0o755)
+    monkeypatch.setattr(clock_module, "_LIBC", Refusing())
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    assert is_clock_synchronised() is is_synchronised

@@ -97,8 +97,11 @@ def _running(state: Path | None) -> Finding:
 
 
 def _clock() -> Finding:
-    if is_clock_synchronised():
-        return Finding(GO, "clock", "the kernel reports a synchronised clock")
+    is_synchronised = is_clock_synchronised()
+    if is_synchronised:
+        return Finding(GO, "clock", "synchronised")
+    if is_synchronised is None:
+        return Finding(WARN, "clock", "neither the kernel nor systemd says whether it is synchronised; look yourself")
     return Finding(WARN, "clock", "not synchronised; start chrony or ntpd: 0.1 s is up to 0.1 deg on a low orbit")
 
 
