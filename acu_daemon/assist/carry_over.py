@@ -4,7 +4,7 @@ The orbit's corrections hold wherever the satellite is seen from; the angle bias
 where the next pass is seen by the same station.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import hypot
 
 import numpy as np
@@ -56,6 +56,28 @@ class CarryOver:
     bias: AngleBias
     station_shift_enu_m: tuple[float, float, float]
     covariance: Array = field(compare=False, repr=False)  # (13, 13), see full_states
+    is_of_this_pass: bool = False  # of the pass in progress, left by a daemon that was started again: it does not age
+
+
+def resume_of(fit: FitResult, source: Propagator, site: Site) -> CarryOver | None:
+    """What a fit leaves to the same pass, should the daemon start again; None where no reading is behind it.
+
+    Of an estimator without a covariance it holds zeros, which nobody looks at.
+    Raises:  OrbitError: the source has no answer at its epoch.
+    """
+    if fit.reading_count == 0:
+        return None
+    covariance = np.zeros((STATE_COUNT, STATE_COUNT)) if fit.covariance is None else fit.covariance
+    return replace(_of(fit, covariance, source, site), is_of_this_pass=True)
+
+
+def why_not_resume(carried: CarryOver, source: Propagator, site: Site, estimator: str, now_tai_s: float) -> str:
+    """Why a fit of this pass cannot be gone on from; empty where it can."""
+    if carried.at_tai_s > now_tai_s:
+        return "it is from a later time than now"
+    if carried.station != site.station or carried.estimator != estimator:
+        return "the station or the estimator has changed"
+    return "" if _has_same_elements(carried, source) else "the elements have changed"
 
 
 def carry_over_of(fit: FitResult, source: Propagator, site: Site) -> CarryOver | None:
@@ -65,6 +87,10 @@ def carry_over_of(fit: FitResult, source: Propagator, site: Site) -> CarryOver |
     """
     if fit.covariance is None or fit.reading_count < LEAST_READINGS:
         return None
+    return _of(fit, fit.covariance, source, site)
+
+
+def _of(fit: FitResult, covariance: Array, source: Propagator, site: Site) -> CarryOver:
     return CarryOver(
         at_tai_s=fit.at_tai_s,
         estimator=fit.estimator,
@@ -75,7 +101,7 @@ def carry_over_of(fit: FitResult, source: Propagator, site: Site) -> CarryOver |
         correction=fit.correction,
         bias=fit.bias,
         station_shift_enu_m=fit.station_shift_enu_m,
-        covariance=fit.covariance,
+        covariance=covariance,
     )
 
 
@@ -103,14 +129,21 @@ def aged_prior(
     The mean motion is first held to what elements are worth over days: within one pass its error looks like others',
     and what a pass's noise leaves in it runs away until the next.  What is left of the correction counts as far as it
     stands out from its own uncertainty.  Then come drag, as a constant error of the mean motion's rate from the fit on,
-    and slow drifts.
+    and slow drifts.  A fit of this pass is taken as it is.
     """
     fresh = make_prior(source, settings, at_tai_s)
+    if carried.is_of_this_pass:
+        return _without_fixed(_mean(carried), carried.covariance.copy(), fresh)
     mean, covariance = _held_to_long_mean_motion(_mean(carried), carried, settings)
     mean[ORBIT] *= _significance(mean[ORBIT], covariance[ORBIT, ORBIT])
     covariance = covariance + _process_noise(carried, settings, np.diag(fresh.covariance), at_tai_s)
     if carried.station != site.station:
         mean, covariance = _orbit_alone(mean, covariance, fresh)
+    return _without_fixed(mean, covariance, fresh)
+
+
+def _without_fixed(mean: Array, covariance: Array, fresh: Prior) -> Prior:
+    """Leave alone what the configuration does not let a fit change."""
     is_no_state = np.diag(fresh.covariance) == 0.0
     mean[is_no_state] = 0.0
     covariance[is_no_state], covariance[:, is_no_state] = 0.0, 0.0

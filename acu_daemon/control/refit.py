@@ -9,7 +9,7 @@ from functools import partial
 
 from acu_daemon.assist.carry_over import CarryOver, aged_prior, first_fit
 from acu_daemon.assist.estimator import Estimator, EstimatorSettings, has_covariance, make_estimator
-from acu_daemon.assist.full import FullEstimator
+from acu_daemon.assist.full import FullEstimator, shift_for_people
 from acu_daemon.assist.gate import OUTLIER
 from acu_daemon.assist.model_choice import Model, ModelChoice, choose, newest_residual_deg
 from acu_daemon.assist.prediction import predict
@@ -27,7 +27,8 @@ RESTART_S = 30.0  # a fit that is bad again and again starts afresh with the new
 class RefitSetup:
     """Everything that stays the same during a pass; it is sent to the child process once.
 
-    carried: what an earlier pass left, accepted (assist.carry_over); only estimators with a covariance use it.
+    carried: what an earlier pass left, accepted (assist.carry_over), which only estimators with a covariance use; or
+    the fit of this pass that the daemon had when it was started again: it goes on from it.
     """
 
     propagator: Propagator
@@ -37,6 +38,11 @@ class RefitSetup:
     azimuth: AxisLimits
     step_s: float = 0.1
     carried: CarryOver | None = None
+
+    @property
+    def is_resumed(self) -> bool:
+        """Whether this pass had a fit already."""
+        return self.carried is not None and self.carried.is_of_this_pass
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +82,7 @@ class Refitter:
     def __init__(self, setup: RefitSetup) -> None:
         self._setup = setup
         self._carried = setup.carried
+        self._resumed = before_fit(setup, setup.carried.at_tai_s) if setup.carried and setup.is_resumed else None
         self._gate = TrackGate(setup.propagator, setup.site, setup.settings)
         self._choice = ModelChoice()
         self._begin_fit()
@@ -92,6 +99,7 @@ class Refitter:
         self._choose(models, has_news=len(request.readings) > 0)
         if self._choice.is_reset_due:
             self._gate.restart(RESTART_S)
+            self._forget_resumed()
             self._begin_fit()
             models = self._models(request.now_tai_s)
             self._choose(models, has_news=True)
@@ -106,12 +114,20 @@ class Refitter:
             readings = readings.part(~is_now)
 
     def _take(self, batch: Readings) -> None:
+        reset_count = self._gate.reset_count
         taken = self._gate.take(batch, self._judge.fit())
+        if self._gate.reset_count > reset_count:
+            self._forget_resumed()
         if taken.is_rebuilt:
             self._begin_fit()
         elif len(taken.new):
             for estimator in self._estimators:
                 estimator.add(taken.new)
+
+    def _forget_resumed(self) -> None:
+        """What this pass's newer readings deny is not gone on from."""
+        if self._resumed is not None:
+            self._resumed = self._carried = None
 
     def _begin_fit(self) -> None:
         """Make the estimator afresh, and one for the gate, which needs a sigma, and give them the kept readings."""
@@ -127,15 +143,15 @@ class Refitter:
     def _take_notes(self) -> tuple[str, ...]:
         notes, self._estimator.notes[:] = tuple(self._estimator.notes), ()
         if notes:  # the readings denied what was carried over
-            self._carried = None
+            self._carried = self._resumed = None
         return notes
 
     def _models(self, now_tai_s: float) -> dict[Model, FitResult | None]:
         """The models there are, each with what it adds to the elements."""
         models: dict[Model, FitResult | None] = {Model.ELEMENTS: None}
-        if self._carried is not None:
+        if self._carried is not None and self._resumed is None:
             models[Model.LAST_PASS] = before_fit(self._setup, now_tai_s)
-        fit = self._estimator.fit()
+        fit = self._estimator.fit() or self._resumed
         if fit is not None:
             models[Model.NEW_FIT] = fit
         return models
@@ -143,7 +159,7 @@ class Refitter:
     def _choose(self, models: dict[Model, FitResult | None], *, has_news: bool) -> None:
         kept, setup = self._gate.kept, self._setup
         if len(kept) == 0:
-            self._choice = ModelChoice(Model.LAST_PASS if Model.LAST_PASS in models else Model.ELEMENTS)
+            self._choice = ModelChoice(list(models)[-1])
         elif has_news:
             residuals_deg = {
                 model: newest_residual_deg(setup.propagator, setup.site, fit, kept, setup.settings)
@@ -168,10 +184,19 @@ class Refitter:
 
 
 def before_fit(setup: RefitSetup, now_tai_s: float) -> FitResult | None:
-    """What an earlier pass left, aged to now: the prediction is made from it before the first fit.  None: nothing."""
-    if setup.carried is None or not has_covariance(setup.estimator):
+    """What the prediction is made from before the first reading; None: the elements alone.
+
+    What an earlier pass left, aged to now, or the fit that this pass had before the daemon was started again.
+    """
+    carried, source = setup.carried, setup.propagator
+    if carried is None or not (carried.is_of_this_pass or has_covariance(setup.estimator)):
         return None
-    return first_fit(setup.carried, aged_prior(setup.carried, setup.propagator, setup.site, setup.settings, now_tai_s))
+    fit = first_fit(carried, aged_prior(carried, source, setup.site, setup.settings, now_tai_s))
+    if not carried.is_of_this_pass:
+        return fit
+    along_s, across_deg = shift_for_people(source, fit.correction, fit.at_tai_s, setup.site)
+    covariance = fit.covariance if has_covariance(setup.estimator) else None
+    return replace(fit, along_s=along_s, across_deg=across_deg, covariance=covariance)
 
 
 def predict_from(setup: RefitSetup, fit: FitResult | None, request: RefitRequest, kind: PredictionKind) -> Prediction:
