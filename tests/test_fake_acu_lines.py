@@ -1,6 +1,7 @@
 """The fake ACU on its lines: in virtual time with exact times, over a real TCP socket, over a real pseudo terminal."""
 
 import asyncio
+from contextlib import AbstractAsyncContextManager
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,11 +15,12 @@ from acu_daemon.protocol.exchange import HostExchange
 from acu_daemon.protocol.messages import Ack, AcuMode, Command, Identify, Poll, Reply, SelectMode, Status, WriteAndPoll
 from acu_daemon.protocol.sa3842 import encode_command
 from acu_daemon.sim.acu import FakeAcu
+from acu_daemon.sim.fault_board import FaultBoard
 from acu_daemon.sim.line import AcuLine
 from acu_daemon.sim.memory import MemoryLink
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.scenario import AcuChoice, Scenario
-from acu_daemon.sim.server import keep_time, serve_pty, serve_tcp
+from acu_daemon.sim.server import acu_peer, keep_time, serve_pty, serve_tcp
 from acu_daemon.sim.trace import TraceRow
 from acu_daemon.sim.virtual import StandstillError, VirtualTimeLoop, run_virtual
 
@@ -43,6 +45,16 @@ async def dialogue(link: Link) -> list[Reply]:
     host = HostExchange()
     commands: list[Command] = [Identify(), WriteAndPoll(30.0, 40.0), SelectMode(AcuMode.REMOTE), Poll()]
     return [await ask(link, host, command) for command in commands]
+
+
+def serving_tcp(host: str, port: int) -> AbstractAsyncContextManager[str]:
+    board = FaultBoard()
+    return serve_tcp(acu_peer(fake_acu(), SystemClock(START_TAI_S), board), board, host, port)
+
+
+def serving_pty(path: Path, baud: int) -> AbstractAsyncContextManager[str]:
+    board = FaultBoard()
+    return serve_pty(acu_peer(fake_acu(), SystemClock(START_TAI_S), board, baud), board, path, baud)
 
 
 def check(replies: list[Reply]) -> None:
@@ -186,8 +198,7 @@ def test_a_quarter_of_an_hour_of_exchanges_repeats_bit_for_bit() -> None:
 
 
 async def test_a_host_speaks_with_the_simulation_over_tcp() -> None:
-    clock = SystemClock(START_TAI_S)
-    async with serve_tcp(fake_acu(), clock, "127.0.0.1", 0) as url:
+    async with serving_tcp("127.0.0.1", 0) as url:
         link = make_link(url)
         for _ in range(2):
             await link.open()
@@ -201,7 +212,7 @@ async def test_a_host_speaks_with_the_simulation_over_tcp() -> None:
 
 
 async def test_a_second_client_is_closed_at_once_while_the_first_one_speaks() -> None:
-    async with serve_tcp(fake_acu(), SystemClock(START_TAI_S), "127.0.0.1", 0) as url:
+    async with serving_tcp("127.0.0.1", 0) as url:
         first, second = make_link(url), make_link(url)
         await first.open()
         await ask(first, HostExchange(), Poll())
@@ -214,7 +225,7 @@ async def test_a_second_client_is_closed_at_once_while_the_first_one_speaks() ->
 
 
 async def test_a_first_client_that_was_silent_is_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
-    async with serve_tcp(fake_acu(), SystemClock(START_TAI_S), "127.0.0.1", 0) as url:
+    async with serving_tcp("127.0.0.1", 0) as url:
         first, second = make_link(url), make_link(url)
         await first.open()
         await ask(first, HostExchange(), Poll())
@@ -228,17 +239,16 @@ async def test_a_first_client_that_was_silent_is_replaced(monkeypatch: pytest.Mo
 
 
 async def test_a_port_that_is_taken_is_a_usage_error() -> None:
-    clock = SystemClock(START_TAI_S)
-    async with serve_tcp(fake_acu(), clock, "127.0.0.1", 0) as url:
+    async with serving_tcp("127.0.0.1", 0) as url:
         with pytest.raises(UsageError, match="cannot listen"):
-            async with serve_tcp(fake_acu(), clock, "127.0.0.1", int(url.rsplit(":", 1)[1])):
+            async with serving_tcp("127.0.0.1", int(url.rsplit(":", 1)[1])):
                 pass
 
 
 @pytest.mark.parametrize("options", ["", "&format=7E1"])
 async def test_a_host_speaks_with_the_simulation_over_a_pseudo_terminal(tmp_path: Path, options: str) -> None:
     path = tmp_path / "acu"
-    async with serve_pty(fake_acu(), SystemClock(START_TAI_S), path, 38400) as url:
+    async with serving_pty(path, 38400) as url:
         assert url == f"serial://{path}?baud=38400"
         link = make_link(url + options)
         for _ in range(2):
@@ -255,10 +265,10 @@ async def test_a_pty_link_never_replaces_a_file(tmp_path: Path) -> None:
     file = tmp_path / "precious"
     file.write_text("data")
     with pytest.raises(UsageError, match="no symbolic link"):
-        async with serve_pty(fake_acu(), SystemClock(START_TAI_S), file, 9600):
+        async with serving_pty(file, 9600):
             pass
     with pytest.raises(UsageError, match="cannot be made"):
-        async with serve_pty(fake_acu(), SystemClock(START_TAI_S), tmp_path / "no" / "acu", 9600):
+        async with serving_pty(tmp_path / "no" / "acu", 9600):
             pass
     assert file.read_text() == "data"
 

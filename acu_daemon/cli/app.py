@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from acu_daemon import __version__
-from acu_daemon.cli import check, demo, fake_acu, passes, replay, run, safe_stop
+from acu_daemon.cli import check, demo, fake_acu, fault_proxy, passes, replay, run, safe_stop
 from acu_daemon.errors import AcuDaemonError, NoAcuError, UsageError
 
 EXIT_FAILED, EXIT_USAGE, EXIT_NO_ACU, EXIT_INTERNAL = 1, 2, 3, 4
@@ -53,6 +53,7 @@ def _common(
 
 app.command(name="run")(run.command)
 app.command(name="fake-acu")(fake_acu.command)
+app.command(name="fault-proxy")(fault_proxy.command)
 app.command(name="demo")(demo.command)
 app.command(name="passes")(passes.command)
 app.command(name="check")(check.command)

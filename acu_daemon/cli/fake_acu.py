@@ -2,20 +2,23 @@
 
 import asyncio
 import contextlib
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from acu_daemon.cli.options import STOP_SIGNALS, At, AtMonotonic, Config, Satellite, load_target, make_clock
+from acu_daemon.cli.options import At, AtMonotonic, Config, Satellite, load_target, make_clock
+from acu_daemon.cli.serving import Control, Place, parse_place, serve_until_stopped
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.link import BITS_PER_CHARACTER, DEFAULT_BAUD, make_link
 from acu_daemon.errors import UsageError
 from acu_daemon.protocol.sa3842 import address_byte
 from acu_daemon.sim.acu import FakeAcu
+from acu_daemon.sim.acu_faults import break_acu
 from acu_daemon.sim.build import build_fake_acu
-from acu_daemon.sim.server import keep_time, serve_pty, serve_tcp
+from acu_daemon.sim.fault_board import FaultBoard
+from acu_daemon.sim.fault_verbs import FRAME_VERBS, PEDESTAL_VERBS
+from acu_daemon.sim.server import acu_peer, keep_time
 from acu_daemon.sim.trace import TraceWriter
 from acu_daemon.sim.wire_log import WireLogWriter
 
@@ -35,6 +38,7 @@ def command(
         Path | None,
         typer.Option("--pty", metavar="LINK", help="Serve on a pseudo terminal and put a symbolic link to it here."),
     ] = None,
+    control: Control = None,
     at: At = None,
     at_monotonic: AtMonotonic = None,
     scenario: Annotated[
@@ -56,13 +60,16 @@ def command(
 ) -> None:
     """SIMULATION: a Scientific-Atlanta 3842 with pedestal, receiver and sky, for rehearsals and tests.
 
+    Faults: [[fault]] tables of the scenario (verb, start_s, duration_s, count, probability, value, axis, on, seed), or
+    live, one line in, one line out:  echo 'fault no-reply count=3' | nc 127.0.0.1 3900;  `help` lists all verbs.
+
     Prints `listening tcp://HOST:PORT` (or the link of the pseudo terminal) when it is ready; ends on SIGTERM or Ctrl-C.
     Run the daemon beside it with the same --at and --at-monotonic, so that both share one clock.
 
     A scenario holds [sky] along_track_s, delta_raan_deg; [encoder] azimuth_bias_deg, elevation_bias_deg, noise_deg;
     [receiver] peak_agc_db, agc_noise_db, tracking_noise_deg; [acu] has_tilt, reply_latency_s, mode, azimuth_deg,
     elevation_deg; and any number of [[loss]] with cause ("receiver", "silence-zone", "fade"), and start_s, duration_s
-    or from_utc, to_utc.
+    or from_utc, to_utc; and [[fault]], as above.
     """
     clock = make_clock(at, at_monotonic)
     target = load_target(config, satellite, clock.tai_s(), is_strict=False)
@@ -80,43 +87,29 @@ def command(
         address=address_byte(station.acu.address),
     )
     typer.echo(f"SIMULATION of an SA-3842 for {target.elements.label} over {station.station.name}", err=True)
+    if listen is not None and pty is not None:
+        raise UsageError("--listen and --pty exclude each other")
     url = station.acu.url
     with contextlib.ExitStack() as files:
         if trace is not None:
             acu.observer = files.enter_context(TraceWriter(trace)).add
         if wire_log is not None:
             acu.on_write = files.enter_context(WireLogWriter(wire_log)).add
-        asyncio.run(_serve(acu, clock, *_where(listen, pty, url)))
+        asyncio.run(_serve(acu, clock, _where(listen, pty, url), control))
 
 
-def _where(listen: str | None, pty: Path | None, url: str) -> tuple[str, int, Path | None, int]:
-    """Host and port, or the pseudo terminal and its baud rate."""
-    if listen is not None and pty is not None:
-        raise UsageError("--listen and --pty exclude each other")
+def _where(listen: str | None, pty: Path | None, url: str) -> Place:
+    """Where to serve, by the options or by the station's URL."""
     byte_time_s = make_link(url).byte_time_s
     if pty is not None or (listen is None and url.startswith("serial:")):
         if pty is None:
             raise UsageError(f"the station's acu.url is {url}: give --pty LINK, or --listen HOST:PORT")
-        return "", 0, pty, round(BITS_PER_CHARACTER / byte_time_s) if byte_time_s else DEFAULT_BAUD
-    text = listen if listen is not None else url.removeprefix("tcp://").split("?")[0]
-    host, _, port = text.rpartition(":")
-    if not host or not port.isdigit() or int(port) > 65535:
-        raise UsageError(f"--listen {text!r}: expected HOST:PORT, such as 127.0.0.1:3842")
-    return host, int(port), None, 0
+        return Place(pty=pty, baud=round(BITS_PER_CHARACTER / byte_time_s) if byte_time_s else DEFAULT_BAUD)
+    return Place(*parse_place("--listen", listen or url.removeprefix("tcp://").split("?")[0]))
 
 
-async def _serve(acu: FakeAcu, clock: SystemClock, host: str, port: int, pty: Path | None, baud: int) -> None:
-    stopped = asyncio.Event()
-    for number in STOP_SIGNALS:
-        asyncio.get_running_loop().add_signal_handler(number, stopped.set)
-    server = serve_pty(acu, clock, pty, baud) if pty is not None else serve_tcp(acu, clock, host, port)
-    async with server as where:
-        sys.stdout.write(f"listening {where}\n")
-        sys.stdout.flush()
-        keeper = asyncio.create_task(keep_time(acu, clock))
-        waiting = asyncio.create_task(stopped.wait())
-        done, _ = await asyncio.wait({keeper, waiting}, return_when=asyncio.FIRST_COMPLETED)
-        for task in (keeper, waiting):
-            task.cancel()
-        if keeper in done:
-            keeper.result()
+async def _serve(acu: FakeAcu, clock: SystemClock, place: Place, control: str | None) -> None:
+    board = FaultBoard(FRAME_VERBS | PEDESTAL_VERBS | place.line_verbs)
+    break_acu(acu, board, clock)
+    peer, faults = acu_peer(acu, clock, board, place.baud), acu.parts.scenario.faults
+    await serve_until_stopped(peer, board, place, control, faults, lambda: keep_time(acu, clock))

@@ -118,9 +118,11 @@ def fly(
         acu = make_acu(parts)
         acu.observer = flight.rows.append
         acu.on_write = flight.writes.append
-        board = FaultBoard(scenario.faults)
+        board = FaultBoard()
         break_acu(acu, board, clock)
         link = _TappedLink(acu, clock, byte_time_s, parts.address, flight, board)
+        for fault in scenario.faults:
+            board.add(fault)
         job = make_job(target, coming_pass(target, begin_tai_s), link, is_rehearsal=True, end_tai_s=end_tai_s)
         service = Service(job, link, clock, make_runner(job.refit), on_snapshot=flight.snapshots.append)
         loop = asyncio.get_running_loop()

@@ -1,10 +1,10 @@
 """SIMULATION: which faults are present now.  Runs on the timers of the running loop, real or virtual."""
 
 import asyncio
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container
 from random import Random
 
-from acu_daemon.sim.fault_verbs import VERBS, Direction, Fault, VerbName, fault_text
+from acu_daemon.sim.fault_verbs import VERBS, Direction, Fault, FaultError, VerbName, fault_text
 
 BOTH_WAYS: tuple[VerbName, ...] = ("wrong-baud", "nak")
 AGAIN_S = 1.0  # a fault of an instant that happens more than once, without duration_s
@@ -25,23 +25,27 @@ class _Entry:
 
 
 class FaultBoard:
-    """Faults are added, begin, end and are cleared; whoever acts them out listens, or asks at each frame."""
+    """Faults are added, begin, end and are cleared; whoever acts them out listens, or asks at each frame.
 
-    def __init__(self, faults: Iterable[Fault] = ()) -> None:
+    known: the verbs that are acted out here; None: all.
+    """
+
+    def __init__(self, known: Container[VerbName] | None = None) -> None:
+        self._known = known
         self._loop = asyncio.get_running_loop()
         self._entries: dict[int, _Entry] = {}
         self._listeners: list[Listener] = []
         self._next_number = 1
         self.touches_frames = False  # whether any fault of frames is present
-        for fault in faults:
-            self.add(fault)
 
     def listen(self, listener: Listener) -> None:
         """Be told of every fault that lasts, True when it begins and False when it ends, and of those of an instant."""
         self._listeners.append(listener)
 
     def add(self, fault: Fault) -> int:
-        """Plan a fault, start_s from now; return its number."""
+        """Plan a fault, start_s from now; return its number.  FaultError: nobody here can act it out."""
+        if self._known is not None and fault.verb not in self._known:
+            raise FaultError(f"{fault.verb}: this program and this link cannot do that")
         entry = _Entry(self._next_number, fault)
         self._next_number += 1
         self._entries[entry.number] = entry

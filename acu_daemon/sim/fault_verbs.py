@@ -82,6 +82,10 @@ VERBS: dict[VerbName, Verb] = {
 }
 
 
+FRAME_VERBS = frozenset(name for name, verb in VERBS.items() if verb.place == "frame")
+PEDESTAL_VERBS = frozenset(name for name, verb in VERBS.items() if verb.place == "pedestal")
+
+
 @dataclass(frozen=True, slots=True)
 class Fault:
     """One fault.  Times count from the start of the simulation, or from the command at a control port.

@@ -9,7 +9,7 @@
 """
 
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -101,6 +101,11 @@ class Scenario:
 
 _SECTIONS = {"sky": SkyErrors, "encoder": Encoder, "receiver": ReceiverChoice, "acu": AcuChoice}
 _LISTS = ("loss", "fault")
+
+
+def read_faults(path: Path, seed: int = 0) -> tuple[Fault, ...]:
+    """Read only the faults of a scenario; seed: added to each of theirs.  ConfigError: as read_scenario."""
+    return tuple(replace(fault, seed=fault.seed + seed) for fault in read_scenario(path).faults)
 
 
 def read_scenario(path: Path) -> Scenario:

@@ -1,15 +1,23 @@
-"""SIMULATION served over TCP and over a pseudo terminal, as ICD section 1 asks of an ACU."""
+"""SIMULATION of the ACU's end of a connection, over TCP and over a pseudo terminal, with its faults (ICD section 1).
+
+What stands behind it, the fake ACU or the way to a real one, is a Peer.
+"""
 
 import asyncio
 import contextlib
 import os
+import socket
+import struct
 import tty
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
+from typing import Protocol, get_args
 
 from acu_daemon.edge.clock import Clock
 from acu_daemon.errors import UsageError
 from acu_daemon.sim.acu import FakeAcu
+from acu_daemon.sim.fault_board import FaultBoard
+from acu_daemon.sim.fault_verbs import Fault, LineVerb, VerbName
 from acu_daemon.sim.line import AcuLine
 
 TCP_GAP_S = 0.250
@@ -17,6 +25,29 @@ PTY_GAP_S = 0.050
 SILENT_S = 5.0  # a client that was silent for this long is replaced by a new one
 ADVANCE_S = 0.1
 READ_BYTES = 4096
+_RESET = struct.pack("ii", 1, 0)  # SO_LINGER on, 0 s: close() sends RST
+
+
+TCP_FAULTS: frozenset[VerbName] = frozenset(get_args(LineVerb))
+PTY_FAULTS: frozenset[VerbName] = frozenset({"cut", "deaf", "reset", "unplug"})
+
+
+class Peer(Protocol):
+    """Takes what a client sends."""
+
+    def receive(self, data: bytes) -> None: ...
+
+    def close(self) -> None: ...
+
+
+Send = Callable[[bytes], None]
+MakePeer = Callable[[Send, Callable[[], None]], Peer]  # send: to the client; hang_up: the peer has gone
+
+
+def acu_peer(acu: FakeAcu, clock: Clock, board: FaultBoard, baud: int = 0) -> MakePeer:
+    """The fake ACU as a peer; baud: it paces both directions."""
+    gap_s, byte_time_s = (PTY_GAP_S, 10.0 / baud) if baud else (TCP_GAP_S, 0.0)
+    return lambda send, _hang_up: AcuLine(acu, clock, send, gap_s=gap_s, byte_time_s=byte_time_s, board=board)
 
 
 async def keep_time(acu: FakeAcu, clock: Clock) -> None:
@@ -27,111 +58,235 @@ async def keep_time(acu: FakeAcu, clock: Clock) -> None:
 
 
 @contextlib.asynccontextmanager
-async def serve_tcp(acu: FakeAcu, clock: Clock, host: str, port: int) -> AsyncIterator[str]:
+async def serve_tcp(make_peer: MakePeer, board: FaultBoard, host: str, port: int) -> AsyncIterator[str]:
     """Serve on a TCP port, one client at a time; yields the URL (port 0: any free one).  UsageError: cannot listen."""
-    seat = _Seat()
+    door = _Door(make_peer, board, host)
     try:
-        server = await asyncio.get_running_loop().create_server(lambda: _Client(acu, clock, seat), host, port)
+        await door.open(port)
     except OSError as error:
         raise UsageError(f"cannot listen on tcp://{host}:{port}: {error.strerror or error}") from None
+    board.listen(door.on_fault)
     try:
-        yield f"tcp://{host}:{server.sockets[0].getsockname()[1]}"
+        yield f"tcp://{host}:{door.port}"
     finally:
-        server.close()
-        if seat.client is not None:
-            seat.client.leave()
-        await server.wait_closed()
+        await door.close()
 
 
-class _Seat:
-    """The one place for a client."""
+class _Door:
+    """The listening socket, and the one place for a client."""
 
-    def __init__(self) -> None:
+    def __init__(self, make_peer: MakePeer, board: FaultBoard, host: str) -> None:
+        self.make_peer, self.board = make_peer, board
+        self._host = host
+        self._server: asyncio.Server | None = None
+        self._loop = asyncio.get_running_loop()
+        self.port = 0
         self.client: _Client | None = None
+        self.clients: set[_Client] = set()  # the dead ones too
+        self.taken_until_s = 0.0
+        self._opening: asyncio.Task[None] | None = None
+
+    async def open(self, port: int) -> None:
+        self._server = await self._loop.create_server(lambda: _Client(self), self._host, port)
+        self.port = self._server.sockets[0].getsockname()[1]
+
+    async def close(self) -> None:
+        if self._opening is not None:
+            await self._opening
+        for client in tuple(self.clients):
+            client.leave()
+        if self._server is not None:
+            self._server.close()
+            await self._server.wait_closed()
+
+    @property
+    def is_closed_to_all(self) -> bool:
+        is_taken = self._loop.time() < self.taken_until_s
+        return is_taken or self.board.is_on("accept-then-close") or self.board.is_on("second-client")
+
+    def on_fault(self, fault: Fault, is_on: bool) -> None:
+        client = self.client
+        match fault.verb:
+            case "refuse" if is_on and self._server is not None:
+                self._server.close()
+                self._server = None
+            case "refuse" if not is_on:
+                self._opening = self._loop.create_task(self.open(self.port))
+            case "half-open" if client is not None:
+                client.is_dead = True
+                self.client = None  # a new connection works
+            case "deaf" if client is not None:
+                client.set_deaf(is_on)
+            case "reset" if client is not None:
+                client.leave()
+            case "second-client" if is_on and client is not None:
+                client.leave()
 
 
 class _Client(asyncio.Protocol):
-    def __init__(self, acu: FakeAcu, clock: Clock, seat: _Seat) -> None:
-        self._acu, self._clock, self._seat = acu, clock, seat
+    def __init__(self, door: _Door) -> None:
+        self._door = door
         self._loop = asyncio.get_running_loop()
         self._heard_s = self._loop.time()
-        self._line: AcuLine | None = None
+        self._peer: Peer | None = None
         self._transport: asyncio.Transport | None = None
+        self.is_dead = False
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         if not isinstance(transport, asyncio.Transport):
             raise TypeError("a stream transport is needed")
-        self._transport = transport
-        present = self._seat.client
+        self._transport, door = transport, self._door
+        door.clients.add(self)
+        present = door.client
+        if door.is_closed_to_all or (present is not None and present.silence_s < SILENT_S):
+            transport.close()
+            return
         if present is not None:
-            if present.silence_s < SILENT_S:
-                transport.close()
-                return
             present.leave()
-        self._seat.client = self
-        self._line = AcuLine(self._acu, self._clock, transport.write, gap_s=TCP_GAP_S)
+        door.client = self
+        self._peer = door.make_peer(self._send, self.leave)
+        if door.board.is_on("deaf"):
+            self.set_deaf(True)
 
     @property
     def silence_s(self) -> float:
         return self._loop.time() - self._heard_s
 
+    def set_deaf(self, is_deaf: bool) -> None:
+        """Read no more, so that what the client writes waits in the network; or read it all."""
+        if self._transport is None or self._transport.is_closing():
+            return
+        if is_deaf:
+            self._transport.pause_reading()
+        else:
+            self._transport.resume_reading()
+
+    def _send(self, data: bytes) -> None:
+        if self._transport is not None and not self.is_dead:
+            self._transport.write(data)
+
     def leave(self) -> None:
-        """Make room at once."""
-        if self._seat.client is self:
-            self._seat.client = None
-        if self._line is not None:
-            self._line.close()
+        """Make room at once; the client sees a reset."""
+        self._forget()
         if self._transport is not None:
+            with contextlib.suppress(OSError):
+                self._transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
             self._transport.abort()
+
+    def _forget(self) -> None:
+        if self._door.client is self:
+            self._door.client = None
+        if self._peer is not None:
+            self._peer.close()
+            self._peer = None
 
     def data_received(self, data: bytes) -> None:
         self._heard_s = self._loop.time()
-        if self._line is not None:
-            self._line.receive(data)
+        if self._peer is not None and not self.is_dead:
+            self._peer.receive(data)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        self.leave()
+        self._door.clients.discard(self)
+        if self._door.client is self and self._door.board.is_on("slow-close"):
+            self._door.taken_until_s = self._loop.time() + self._door.board.amount("slow-close")
+        self._forget()
 
 
 @contextlib.asynccontextmanager
-async def serve_pty(acu: FakeAcu, clock: Clock, link: Path, baud: int) -> AsyncIterator[str]:
-    """Serve on a pseudo terminal, paced at the baud rate both ways, found at a symbolic link; yields the URL.
-
-    UsageError: the link cannot be made.
-    """
-    master, slave = os.openpty()
+async def serve_pty(make_peer: MakePeer, board: FaultBoard, link: Path, baud: int) -> AsyncIterator[str]:
+    """Serve on a pseudo terminal found at a symbolic link; yields the URL.  UsageError: the link cannot be made."""
+    jack = _Jack(make_peer, board, link)
+    jack.plug_in()
+    board.listen(jack.on_fault)
     try:
-        tty.setraw(slave)
-        os.set_blocking(master, False)
-        loop = asyncio.get_running_loop()
+        yield f"serial://{jack.path}?baud={baud}"
+    finally:
+        jack.unplug()
 
-        def send(piece: bytes) -> None:
+
+class _Jack:
+    """A pseudo terminal in the place of a serial adapter, that can be pulled out and put back."""
+
+    def __init__(self, make_peer: MakePeer, board: FaultBoard, link: Path) -> None:
+        self._make_peer, self._board, self._link = make_peer, board, link
+        self._loop = asyncio.get_running_loop()
+        self._master = self._slave = -1
+        self._peer: Peer | None = None
+
+    @property
+    def path(self) -> Path:
+        """The link, which stays while the device behind it changes."""
+        return self._link.absolute()
+
+    def plug_in(self) -> None:
+        """Open a terminal and put the link to it; we hold both ends, so that the line outlives its clients."""
+        if self._link.exists() and not self._link.is_symlink():
+            raise UsageError(f"--pty {self._link} exists and is no symbolic link; choose another name")
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        device = os.ttyname(self._slave)
+        try:
+            self._link.unlink(missing_ok=True)
+            self._link.symlink_to(device)
+        except OSError as error:
+            self._close()
+            raise UsageError(f"--pty {self._link} cannot be made: {error.strerror}") from None
+        self._peer = self._make_peer(self._send, self._replug)
+        self._listen()
+
+    def unplug(self) -> None:
+        """Close the terminal: its client gets EIO; the link goes."""
+        if self._master < 0:
+            return
+        self._loop.remove_reader(self._master)
+        if self._peer is not None:
+            self._peer.close()
+        self._link.unlink(missing_ok=True)
+        self._close()
+
+    def _close(self) -> None:
+        os.close(self._slave)
+        os.close(self._master)
+        self._master = self._slave = -1
+
+    def _replug(self) -> None:
+        self.unplug()
+        self.plug_in_elsewhere()
+
+    def plug_in_elsewhere(self) -> None:
+        """Come back under another device name."""
+        spare = os.openpty()
+        try:
+            self.plug_in()
+        finally:
+            for descriptor in spare:
+                os.close(descriptor)
+
+    def _listen(self) -> None:
+        if not self._board.is_on("deaf"):
+            self._loop.add_reader(self._master, self._read)
+
+    def _read(self) -> None:
+        data = os.read(self._master, READ_BYTES)
+        if self._peer is not None:
+            self._peer.receive(data)
+
+    def _send(self, piece: bytes) -> None:
+        if self._master >= 0:
             with contextlib.suppress(BlockingIOError):  # nobody reads: lost, as on a wire
-                os.write(master, piece)
+                os.write(self._master, piece)
 
-        line = AcuLine(acu, clock, send, gap_s=PTY_GAP_S, byte_time_s=10.0 / baud)
-        with _symbolic_link(link, os.ttyname(slave)) as path:
-            loop.add_reader(master, lambda: line.receive(os.read(master, READ_BYTES)))
-            try:
-                yield f"serial://{path}?baud={baud}"
-            finally:
-                loop.remove_reader(master)
-                line.close()
-    finally:
-        os.close(slave)  # held open until now, so that the line outlives its clients
-        os.close(master)
-
-
-@contextlib.contextmanager
-def _symbolic_link(link: Path, device: str) -> Iterator[Path]:
-    if link.exists() and not link.is_symlink():
-        raise UsageError(f"--pty {link} exists and is no symbolic link; choose another name")
-    try:
-        link.unlink(missing_ok=True)
-        link.symlink_to(device)
-    except OSError as error:
-        raise UsageError(f"--pty {link} cannot be made: {error.strerror}") from None
-    try:
-        yield link.absolute()
-    finally:
-        link.unlink(missing_ok=True)
+    def on_fault(self, fault: Fault, is_on: bool) -> None:
+        match fault.verb:
+            case "unplug" if is_on:
+                self.unplug()
+            case "unplug":
+                self.plug_in_elsewhere()
+            case "reset" if self._master >= 0:
+                self._replug()
+            case "deaf" if self._master >= 0:
+                if is_on:
+                    self._loop.remove_reader(self._master)
+                else:
+                    self._listen()
