@@ -58,5 +58,5 @@ def make_estimator(
     if name not in ESTIMATORS:
         raise UsageError(f"no estimator {name!r}: expected one of {', '.join(ESTIMATORS)}")
     if has_covariance(name):
-        return FullEstimator(propagator, site, settings, carried)
+        return FullEstimator(propagator, site, settings, carried, may_widen=True)
     return ESTIMATORS[name](propagator, site, settings)

@@ -1,0 +1,84 @@
+"""Elements that are worse than their sigmas say: which widening of the prior the readings ask for.  Pure.
+
+Elements are mostly wrong along the track, by drag, a manoeuvre or a wrong clock, so that is the first way to widen.  Of
+several priors the one under which the readings are most likely counts, their evidence (MacKay, Bayesian interpolation,
+Neural Computation 4 (1992) 415, section 2): a wider one must earn its width.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from acu_daemon.assist.full_points import Sights
+from acu_daemon.assist.full_solve import Problem, Solution, solve
+from acu_daemon.assist.full_states import ORBIT
+from acu_daemon.units import DEG, Array
+
+STRAIN_LIMIT = 8.0  # sigmas squared, of six orbit states and the biases; the evidence then decides
+NOISE_LIMIT = 3.0  # times the configured one: the fit may be caught far from the readings
+_MEAN_ANOMALY = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Width:
+    """How much wider than given: the anomaly's sigma beside the given one, and a factor of all orbit states'."""
+
+    along_deg: float = 0.0
+    factor: float = 1.0
+
+    def of(self, problem: Problem) -> Problem:
+        """The problem with an orbit that is worth less."""
+        covariance = problem.prior.covariance.copy()
+        covariance[ORBIT] *= self.factor
+        covariance[:, ORBIT] *= self.factor
+        covariance[_MEAN_ANOMALY, _MEAN_ANOMALY] += (self.along_deg * DEG) ** 2
+        return replace(problem, prior=replace(problem.prior, covariance=covariance))
+
+
+WIDTHS = (Width(), Width(1.0), Width(1.0, 5.0), Width(5.0, 25.0))
+
+
+def most_likely(problem: Problem, least: int, seen: Sights, given: Solution) -> tuple[Solution, int]:
+    """The most likely solution among the widths from number `least` of WIDTHS on, whose own is given, and its number.
+
+    Raises:  OrbitError: the source has no answer for one of the times, or for the states on the way.
+    """
+    best = given, least, evidence(WIDTHS[least].of(problem), given)
+    for k in range(least + 1, len(WIDTHS)):
+        wider = WIDTHS[k].of(problem)
+        solution = solve(wider, seen, best[0])
+        likely = evidence(wider, solution)
+        if likely > best[2]:
+            best = solution, k, likely
+    return best[:2]
+
+
+def is_strained(problem: Problem, solution: Solution) -> bool:
+    """Whether a solution lies beyond the prior, or far from the readings because of it."""
+    return _strain(problem, solution) > STRAIN_LIMIT or float(np.max(solution.left.noise_scale)) > NOISE_LIMIT
+
+
+def evidence(problem: Problem, solution: Solution) -> float:
+    """Logarithm of how likely the readings are under the prior, but for a constant (Laplace's approximation)."""
+    (of_prior, _), (of_solution, _) = (_held(problem, one) for one in (problem.prior.covariance, solution.covariance))
+    occam = float(np.linalg.slogdet(of_solution)[1] - np.linalg.slogdet(of_prior)[1])
+    left = solution.left
+    misfit = float(np.sum(left.weights * np.sum(np.square(left.off_rad / left.noise_rad), axis=1)))
+    noise = 2.0 * left.off_rad.shape[0] * float(np.sum(np.log(left.noise_scale)))
+    likely: float = (occam - misfit - noise - _strain(problem, solution)) / 2.0
+    return likely
+
+
+def _strain(problem: Problem, solution: Solution) -> float:
+    """How far the states are from the prior's, sigmas squared."""
+    correlation, off = _held(problem, problem.prior.covariance, solution.x - problem.prior.mean)
+    return float(off @ np.linalg.solve(correlation, off))
+
+
+def _held(problem: Problem, covariance: Array, off: Array | None = None) -> tuple[Array, Array]:
+    """The states that the prior leaves open, in its sigmas."""
+    sigma = np.sqrt(np.diag(problem.prior.covariance))
+    is_open = sigma > 0.0
+    unit = sigma[is_open]
+    off = np.zeros(sigma.size) if off is None else off
+    return covariance[np.ix_(is_open, is_open)] / np.outer(unit, unit), off[is_open] / unit
