@@ -9,6 +9,7 @@ from flights import (
     DEMO_TAI_S,
     ORDERS,
     RISING_TAI_S,
+    WRONG_ORBIT,
     Script,
     climb,
     commands_between,
@@ -53,6 +54,7 @@ from acu_daemon.sim.scenario import AcuChoice, SkyErrors
 HOLD_DEG = 0.1
 RELOCK_S = 1.0
 TICK_S = 0.1
+FIRST_FIT_S = 1.5  # of autotrack: dwell, and the readings of a first fit
 T = RISING_TAI_S
 
 
@@ -88,7 +90,7 @@ def test_an_early_loss_makes_no_jump(after_s: float) -> None:
     flight = climb(lost_s + 8.0, losses=[(lost_s, lost_s + 6.0)])
     before = next(row.beam_error_deg for row in flight.rows if row.tai_s > T + lost_s - 0.1)
     assert worst_error_deg(flight, T + lost_s, T + lost_s + 5.0) < (before or 0.0) + HOLD_DEG
-    assert seconds_to_state(flight, "HOLD/TLE" if after_s < 1.0 else "HOLD/FITTED", T + lost_s) <= 0.25
+    assert seconds_to_state(flight, "HOLD/TLE" if after_s < FIRST_FIT_S else "HOLD/FITTED", T + lost_s) <= 0.25
 
 
 class Slow(InlineFitRunner):
@@ -573,7 +575,9 @@ def test_the_end_of_the_pass_ends_the_run() -> None:
     assert flight.outcome is not None
     assert flight.outcome.reason == "pass over"
     assert flight.outcome.is_stopped
-    assert flight.commands[-1][0] == pytest.approx(coming.set_tai_s + 1.9, abs=0.6)
+    late_s = [seen.along_s for seen in flight.snapshots if seen.state == "AUTOTRACK/FITTED"][-1]
+    assert late_s == pytest.approx(WRONG_ORBIT.along_track_s, abs=1.5)  # all that 20 s at 5 deg elevation tell
+    assert flight.commands[-1][0] == pytest.approx(coming.set_tai_s + 1.0 + late_s, abs=0.2)
 
 
 def test_an_antenna_that_autotracks_long_before_the_pass_is_left_to_whoever_uses_it() -> None:
