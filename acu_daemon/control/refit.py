@@ -134,7 +134,9 @@ class Refitter:
         setup = self._setup
         what = (setup.propagator, setup.site, setup.settings)
         self._estimator: Estimator = make_estimator(setup.estimator, *what, self._carried)
-        self._judge: Estimator = self._estimator if has_covariance(setup.estimator) else FullEstimator(*what)
+        self._judge: Estimator = (
+            self._estimator if has_covariance(setup.estimator) else FullEstimator(*what, may_widen=True)
+        )
         self._estimators = [self._estimator] if self._judge is self._estimator else [self._estimator, self._judge]
         if len(self._gate.kept):
             for estimator in self._estimators:
