@@ -8,23 +8,28 @@ from typing import Any
 import structlog
 
 from acu_daemon.assist.gate import ABOVE_MAX_ELEVATION
+from acu_daemon.assist.model_choice import Model
 from acu_daemon.control.refit import GateVerdict, RefitReply, RefitRequest, RefitSetup, before_fit, predict_from
 from acu_daemon.control.state import PassPlan
 from acu_daemon.control.states import AUTOTRACKING, HOLDING, TrackState
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.edge.clock import Clock
-from acu_daemon.edge.fit import FitFailedError, FitRunner
+from acu_daemon.edge.fit import FitDiedError, FitFailedError, FitRunner
 from acu_daemon.errors import OrbitError
-from acu_daemon.model import FitResult
+from acu_daemon.model import FitResult, Readings
 
 REFIT_PERIOD_S = 1.0  # an accepted fit replaces the buffer at least once a second while locked
 PAST_S = 1.0  # the buffer starts this long before now: readings are compared at the time of their sample
 RETRY_S = 0.5
+LONGEST_PAUSE_S = 30.0  # a fit process that dies again and again is started this often at last
 FIRST_FIT_COUNT = 5  # a fit to fewer readings is no better than the offset that carries the path until then
 
 
 class Background:
-    """Owns the requests to the fit runner; the foreground only wakes it."""
+    """Owns the requests to the fit runner; the foreground only wakes it.
+
+    Started again in a pass that had a fit, it begins with that.
+    """
 
     def __init__(
         self,
@@ -48,9 +53,16 @@ class Background:
         self._on_fit = on_fit
         self._wake = asyncio.Event()
         self._last_tai_s = -1e18
+        self._has_asked = False
+        self._died_count = 0  # in a row
+        self._pause_until_tai_s = -1e18
         self._seen: TrackState | None = None
         self._verdict = GateVerdict()
         self._log: Any = structlog.get_logger("fit")
+        if setup.is_resumed:
+            area.sky = replace(area.sky, fit=before_fit(setup, clock.tai_s()))
+            area.model = Model.NEW_FIT
+            area.state = replace(area.state, has_acquired=True)
 
     def wake(self) -> None:
         """Look whether a refit is due.  Called by the foreground after every tick; never blocks."""
@@ -64,16 +76,13 @@ class Background:
                 await self._refit()
 
     def _is_due(self) -> bool:
-        """At once without a buffer and on a loss; each second while locked; at low water."""
+        """At once when the pass is near and on a loss; each second while locked; at low water."""
         area, now_tai_s = self._area, self._clock.tai_s()
         before, self._seen = self._seen, area.state.track
-        plan = area.sky.plan
-        if (
-            area.state.status is None
-            or plan is None
-            or now_tai_s < plan.rise_tai_s - self._preposition_s - REFIT_PERIOD_S
-        ):
+        if area.state.status is None or not self._is_near(now_tai_s):
             return False
+        if not self._has_asked:
+            return True
         prediction = area.sky.prediction
         is_loss = before in AUTOTRACKING and area.state.track in HOLDING
         if is_loss:
@@ -84,37 +93,53 @@ class Background:
         fewest = 1 if area.sky.fit else FIRST_FIT_COUNT
         return len(area.to_fit) >= fewest and since_last_s >= REFIT_PERIOD_S
 
+    def _is_near(self, now_tai_s: float) -> bool:
+        plan = self._area.sky.plan
+        return plan is not None and now_tai_s >= plan.rise_tai_s - self._preposition_s - REFIT_PERIOD_S
+
     async def _refit(self) -> None:
         area = self._area
-        self._last_tai_s = self._clock.tai_s()
-        request = self._request(self._last_tai_s)
+        self._last_tai_s = now_tai_s = self._clock.tai_s()
+        if now_tai_s < self._pause_until_tai_s:
+            self._predict_here(now_tai_s)
+            return
+        self._has_asked = True
+        request = self._request(now_tai_s, area.take_readings())
         try:
             reply = await self._runner.refit(request)
         except (FitFailedError, OrbitError) as error:
             area.refit_failed_count += 1
-            self._log.warning("fit.failed", reason=str(error))
-            self._predict_here(request)
+            pause_s = self._pause_s(has_died=isinstance(error, FitDiedError))
+            self._pause_until_tai_s = self._clock.tai_s() + pause_s
+            self._log.warning("fit.failed", reason=str(error), pause_s=pause_s)
+            self._predict_here(self._clock.tai_s())
             return
+        self._died_count = 0
         self._take(reply, has_readings=len(request.readings) > 0)
 
-    def _predict_here(self, request: RefitRequest) -> None:
+    def _pause_s(self, *, has_died: bool) -> float:
+        """How long the fit process rests: not after its first death, then ever longer."""
+        self._died_count = self._died_count + 1 if has_died else 0
+        return min(2.0 ** (self._died_count - 2), LONGEST_PAUSE_S) if self._died_count > 1 else 0.0
+
+    def _predict_here(self, now_tai_s: float) -> None:
         """Without the fit process: keep the buffer filled from the last fit, else the elements; 2 ms in the loop."""
         sky = self._area.sky
-        if sky.prediction is not None and sky.prediction.end_tai_s - request.now_tai_s > self._low_water_s:
+        if sky.prediction is not None and sky.prediction.end_tai_s - now_tai_s > self._low_water_s:
             return
+        request = self._request(now_tai_s, Readings.of([]))
         try:
-            fit = before_fit(self._setup, request.now_tai_s) if sky.fit is None else sky.fit
+            fit = before_fit(self._setup, now_tai_s) if sky.fit is None else sky.fit
             prediction = predict_from(self._setup, fit, request, "TLE" if sky.fit is None else "FITTED")
         except OrbitError as error:
             self._log.warning("prediction.failed", reason=str(error))
             return
         self._area.sky = replace(sky, prediction=prediction)
 
-    def _request(self, now_tai_s: float) -> RefitRequest:
-        area = self._area
+    def _request(self, now_tai_s: float, readings: Readings) -> RefitRequest:
         start_tai_s = now_tai_s - PAST_S
         return RefitRequest(
-            readings=area.take_readings(),
+            readings=readings,
             start_tai_s=start_tai_s,
             horizon_s=self._horizon_s + PAST_S,
             now_tai_s=now_tai_s,
@@ -170,6 +195,12 @@ class Background:
         area.sky = replace(area.sky, prediction=reply.prediction, fit=reply.fit)
 
     def set_plan(self, plan: PassPlan) -> None:
-        """Take the plan of the pass; the buffer is made for it from then on."""
+        """Take the plan of the pass; the buffer is made for it from then on, the first one at once.
+
+        The fit process starts meanwhile.
+        """
         self._area.sky = replace(self._area.sky, plan=plan)
+        now_tai_s = self._clock.tai_s()
+        if self._is_near(now_tai_s):
+            self._predict_here(now_tai_s)
         self.wake()

@@ -29,6 +29,10 @@ class FitFailedError(AcuDaemonError):
     """The child died, hung, or could not do what was asked; the message says which."""
 
 
+class FitDiedError(FitFailedError):
+    """The child died or hung: it was ended, and the next question starts another."""
+
+
 class FitRunner(Protocol):
     """Seam between the background task and whoever computes."""
 
@@ -64,7 +68,7 @@ class ProcessFitRunner:
         self.start_count = 0
 
     async def refit(self, request: RefitRequest) -> RefitReply:
-        """Ask the child.  Raises: FitFailedError, after which the next call starts a new child."""
+        """Ask the child.  Raises: FitDiedError, after which the next call starts a new child; FitFailedError."""
         if len(request.readings):
             self._given.append(request.readings)
         is_new = self._child is None or self._child.returncode is not None
@@ -78,10 +82,10 @@ class ProcessFitRunner:
                 reply = await self._receive()
         except TimeoutError:
             await self.close()
-            raise FitFailedError(f"the fit process gave no answer within {timeout_s:g} s") from None
+            raise FitDiedError(f"the fit process gave no answer within {timeout_s:g} s") from None
         except (OSError, asyncio.IncompleteReadError) as error:
             await self.close()
-            raise FitFailedError(f"the fit process died: {error}") from None
+            raise FitDiedError(f"the fit process died: {error}") from None
         except BaseException:
             await self.close()  # cancelled in mid-answer: what the child still says must not meet the next question
             raise
