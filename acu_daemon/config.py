@@ -13,6 +13,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from acu_daemon.assist.estimator import EstimatorSettings
 from acu_daemon.assist.settings import StateSigmas
 from acu_daemon.config_problems import in_words
+from acu_daemon.control.axis_watch import Bounds
 from acu_daemon.control.state import ControlConfig
 from acu_daemon.edge.link import make_link
 from acu_daemon.errors import ConfigError, UsageError
@@ -141,6 +142,10 @@ class TrackingSection(Section):
 
 class SafetySection(Section):
     arm: Literal["auto", "manual"] = "auto"
+    register_watchdog_s: float = Field(default=5.0, ge=0, le=600)  # the ACU's W; 0: it is not touched
+    following_error_deg: float = Field(default=1.0, gt=0, le=30)  # on the sky
+    following_error_s: float = Field(default=2.0, ge=0, le=60)  # 0: the axes are not watched
+    clock_alarm_beam_fraction: float = Field(default=0.1, gt=0, le=10)
 
 
 class StationFile(Section):
@@ -302,6 +307,8 @@ def control_config(station: StationFile, satellite: SatelliteFile, byte_time_s: 
         search_along_s=station.tracking.search_along_s,
         search_across_deg=station.tracking.search_across_deg,
         is_armed=station.safety.arm == "auto",
+        register_watchdog_s=station.safety.register_watchdog_s,
+        following=Bounds(station.safety.following_error_deg, station.safety.following_error_s),
     )
 
 

@@ -46,6 +46,7 @@ from acu_daemon.protocol.messages import (
     Stop,
     Stow,
     WriteAndPoll,
+    WriteParameter,
     WriteRegisters,
 )
 from acu_daemon.sim.acu import FakeAcu
@@ -415,7 +416,7 @@ def test_a_stop_in_mid_pass_leaves_the_acu_in_standby(losses: list[tuple[float, 
     assert flight.outcome is not None
     assert flight.outcome.reason == "SIGTERM"
     assert flight.outcome.is_stopped
-    assert isinstance(flight.commands[-1][1], Stop)
+    assert [command for _, command in flight.commands[-2:]] == [Stop(), WriteParameter("W", 0)]
     assert flight.rows[-1].mode is AcuMode.STANDBY or flight.commands[-1][0] < T + 15.2
 
 
@@ -436,7 +437,7 @@ def test_a_stop_while_the_link_is_lost_waits_a_moment_for_it() -> None:
     flight = climb(30.0, script=script)
     assert flight.outcome is not None
     assert flight.outcome.is_stopped
-    assert isinstance(flight.commands[-1][1], Stop)
+    assert [command for _, command in flight.commands[-2:]] == [Stop(), WriteParameter("W", 0)]
 
 
 def test_a_stop_on_a_dead_link_is_reported_and_does_not_hang() -> None:

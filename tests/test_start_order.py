@@ -75,7 +75,7 @@ def standing(az_deg: float = AZ_DEG, el_deg: float = EL_DEG, *, is_remote_enable
 
 
 def step(state: ControlState, reply: Reply | None, command: Command) -> ControlState:
-    return replace(after_reply(state, Exchange(command, reply)), last_extra=command)
+    return replace(after_reply(state, Exchange(command, reply), CONFIG, []), last_extra=command)
 
 
 def start(state: ControlState, acu: SmallAcu, config: ControlConfig = CONFIG, limit: int = 20) -> ControlState:
@@ -196,8 +196,8 @@ def test_a_refused_write_never_counts_as_done() -> None:
 def test_a_reply_to_another_question_moves_nothing() -> None:
     for stage in Stage:
         state = replace(standing(), stage=stage)
-        assert after_reply(state, Exchange(ReadParameter("A"), Parameter("A", 0))) == state
-        assert after_reply(state, Exchange(Identify(), Nak())) == state
+        assert after_reply(state, Exchange(ReadParameter("A"), Parameter("A", 0)), CONFIG, []) == state
+        assert after_reply(state, Exchange(Identify(), Nak()), CONFIG, []) == state
 
 
 def test_when_it_is_ready_it_asks_for_nothing() -> None:

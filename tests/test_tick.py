@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from acu_daemon.control.absorb import REFUSED_EXTRA_S, REFUSED_PAUSE_S
 from acu_daemon.control.causes import LINK_SILENCE_S
 from acu_daemon.control.state import (
     ControlConfig,
@@ -19,7 +20,7 @@ from acu_daemon.control.state import (
     Stage,
 )
 from acu_daemon.control.states import ACTIVE, TrackState
-from acu_daemon.control.tick import EXTRA_REPEAT_S, REFUSED_EXTRA_S, REFUSED_PAUSE_S, tick
+from acu_daemon.control.tick import EXTRA_REPEAT_S, tick
 from acu_daemon.model import AxisLimits, Prediction, Reading
 from acu_daemon.protocol.angles import LSB_DEG
 from acu_daemon.protocol.messages import (

@@ -30,7 +30,7 @@ from acu_daemon.model import sky_angle_deg
 from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.pointing.keyhole import follow_path
-from acu_daemon.protocol.messages import Stop, WriteAndPoll
+from acu_daemon.protocol.messages import Stop, WriteAndPoll, WriteParameter
 from acu_daemon.sim.scenario import AcuChoice, Encoder, Scenario, SkyErrors
 from acu_daemon.sim.sky import read_truth
 
@@ -77,7 +77,7 @@ def test_a_whole_pass_ends_by_itself_with_a_safe_stop(whole: Flight) -> None:
     assert whole.outcome.is_stopped
     assert whole.outcome.has_acquired
     assert whole.outcome.has_begun
-    assert isinstance(whole.commands[-1][1], Stop)
+    assert [command for _, command in whole.commands[-2:]] == [Stop(), WriteParameter("W", 0)]
     assert count(whole, Stop) == 1
 
 

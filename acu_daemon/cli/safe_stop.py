@@ -72,7 +72,8 @@ async def _stop(station: StationFile) -> bool:
             while not isinstance(answer.reply, Status):
                 await port.idle_gap()
                 answer = await port.exchange(Poll())
-            return await stop_antenna(port, answer.reply)
+            clears_watchdog = station.safety.register_watchdog_s > 0.0
+            return await stop_antenna(port, answer.reply, clears_watchdog=clears_watchdog)
     except TimeoutError:
         why = port.problem or "no answer"
         raise NoAcuError(f"no ACU within {DEADLINE_S:g} s: {why}; look at the antenna") from None

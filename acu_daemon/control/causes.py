@@ -1,6 +1,6 @@
 """Which causes of a transition are present now (control.states has the table they drive)."""
 
-from math import hypot
+from math import cos, hypot, radians
 
 from acu_daemon.control.state import ControlConfig, ControlState, PassPlan, Sky, Stage
 from acu_daemon.control.states import HOLDING, Cause, TrackState
@@ -24,12 +24,24 @@ def find_causes(state: ControlState, sky: Sky, silence_s: float, now_tai_s: floa
     status = state.status
     if silence_s > LINK_SILENCE_S or status is None:
         return {Cause.LINK_SILENT}
+    if state.latch:
+        return {Cause.LINK_BACK, Cause.LATCHED}
     causes = {Cause.LINK_BACK} | _of_status(status, is_stow_kept=state.is_stow_kept)
-    if state.stage is Stage.READY and config.is_armed:
-        causes |= _of_signal(state, status, sky, now_tai_s)
+    if not state.is_armed(config):
+        return causes | _of_others(state, status, sky, now_tai_s, config)
+    if state.stage is Stage.READY:
+        causes |= _of_signal(state, status, sky, now_tai_s, config)
         causes |= _of_plan(state, status, sky, now_tai_s, config)
         causes |= _of_time(state, sky, now_tai_s, config)
     return causes
+
+
+def _of_others(state: ControlState, status: Status, sky: Sky, now_tai_s: float, config: ControlConfig) -> set[Cause]:
+    """What the ACU does under somebody else's hand, while the daemon is disarmed or in shadow."""
+    if not status.is_autotrack_selected:
+        return {Cause.HANDS_OFF}
+    causes = _of_signal(state, status, sky, now_tai_s, config)
+    return causes | (_of_plan(state, status, sky, now_tai_s, config) & {Cause.PASS_OVER, Cause.STILL_SELECTED})
 
 
 def _of_status(status: Status, *, is_stow_kept: bool) -> set[Cause]:
@@ -49,18 +61,29 @@ def is_acquired(status: Status) -> bool:
     return status.mode is AcuMode.AUTOTRACK and status.is_acquired
 
 
-def _of_signal(state: ControlState, status: Status, sky: Sky, now_tai_s: float) -> set[Cause]:
+def _of_signal(state: ControlState, status: Status, sky: Sky, now_tai_s: float, config: ControlConfig) -> set[Cause]:
     has_fit = sky.prediction is not None and sky.prediction.kind == "FITTED"
     causes = {Cause.FIT} if has_fit else set()
     if is_acquired(status):
-        is_ours = sky.plan is not None and now_tai_s >= sky.plan.rise_tai_s - ACQUIRE_LEAD_S
-        if is_ours:  # before that it is another satellite
+        if _is_ours(state, status, sky, now_tai_s, config):
             causes.add(Cause.ACQUIRED_FITTED if has_fit else Cause.ACQUIRED)
         if has_fit and state.track is TrackState.HOLD_FITTED:
             causes.add(Cause.ACQUIRED)
     else:
         causes.add(Cause.LOST)
     return causes
+
+
+def _is_ours(state: ControlState, status: Status, sky: Sky, now_tai_s: float, config: ControlConfig) -> bool:
+    """Whether what autotrack holds can be this pass: late enough, and where it was found so, near the path."""
+    if sky.plan is None or now_tai_s < sky.plan.rise_tai_s - ACQUIRE_LEAD_S:
+        return False
+    target = path_point(sky, now_tai_s)
+    if state.track not in (TrackState.IDLE, TrackState.PREPOSITION) or target is None:
+        return True
+    east_deg_s = target.az_rate_deg_s * cos(radians(target.el_deg))
+    searched_deg = config.search_along_s * hypot(east_deg_s, target.el_rate_deg_s) + config.search_across_deg
+    return _distance_deg(state, status, target) < max(RESUME_DEG, searched_deg)
 
 
 def _of_plan(state: ControlState, status: Status, sky: Sky, now_tai_s: float, config: ControlConfig) -> set[Cause]:

@@ -1,28 +1,35 @@
 """The order of a start, and of a fresh start after the link was lost (design section 3).
 
 Poll, identify, read the registers (for the tilt), free the sector preference, write the present angles, read them back.
-Only then is a path written or a mode selected.  Disarmed, it stops before the first write.
+Only then is a path written or a mode selected, and the register watchdog set.  Disarmed, it stops before the first
+write.  An ACU that refuses to have its parameters read or written is taken as it is, with a warning.
 """
 
 from dataclasses import replace
 
-from acu_daemon.control.state import ControlConfig, ControlState, Exchange, Stage
+from acu_daemon.control.state import ControlConfig, ControlState, Event, Exchange, Stage, Watchdog
 from acu_daemon.protocol.angles import LSB_DEG, clamp_deg
 from acu_daemon.protocol.messages import (
     Ack,
     Command,
     Identify,
     Identity,
+    Nak,
     Parameter,
     ReadParameter,
     ReadRegisters,
     Registers,
+    SelectBackup,
+    Stop,
     WriteParameter,
     WriteRegisters,
 )
 from acu_daemon.units import wrap_180
 
 SECTOR = "S"  # the ACU's sector preference; 0: a register is followed the nearest way (ICD section 4)
+WATCHDOG = "W"  # the ACU's register watchdog: unwritten registers that are followed put it in STANDBY
+WATCHDOG_LSB_S = 0.02  # ICD section 3
+WATCHDOG_TRIES = 6  # exchanges without the reply that was hoped for, until the ACU counts as having no watchdog
 
 
 def next_command(state: ControlState, config: ControlConfig) -> Command | None:
@@ -31,7 +38,7 @@ def next_command(state: ControlState, config: ControlConfig) -> Command | None:
         return Identify()
     if state.stage is Stage.IDENTIFIED:
         return ReadRegisters()
-    if not config.is_armed or state.status is None or not state.status.is_remote_enabled:
+    if state.latch or not state.is_armed(config) or state.status is None or not state.status.is_remote_enabled:
         return None
     if state.stage is Stage.REGISTERS_KNOWN:
         return WriteParameter(SECTOR, 0) if state.last_extra == ReadParameter(SECTOR) else ReadParameter(SECTOR)
@@ -39,7 +46,16 @@ def next_command(state: ControlState, config: ControlConfig) -> Command | None:
         return WriteRegisters(*_present(state, config))
     if state.stage is Stage.PRESENT_WRITTEN:
         return ReadRegisters()
+    if config.register_watchdog_s > 0.0 and state.watchdog is Watchdog.UNKNOWN:
+        if state.last_extra == ReadParameter(WATCHDOG):
+            return WriteParameter(WATCHDOG, watchdog_code(config))
+        return ReadParameter(WATCHDOG)
     return None
+
+
+def watchdog_code(config: ControlConfig) -> int:
+    """Code of the register watchdog's time."""
+    return round(config.register_watchdog_s / WATCHDOG_LSB_S)
 
 
 def _present(state: ControlState, config: ControlConfig) -> tuple[float, float]:
@@ -50,10 +66,17 @@ def _present(state: ControlState, config: ControlConfig) -> tuple[float, float]:
     )
 
 
-def after_reply(state: ControlState, extra: Exchange) -> ControlState:
+def after_reply(state: ControlState, extra: Exchange, config: ControlConfig, events: list[Event]) -> ControlState:
     """Advance by the reply of an extra exchange; a missing or unexpected reply leaves the stage as it is."""
     command, reply = extra.command, extra.reply
+    is_refused = isinstance(reply, Nak) and state.status is not None and state.status.is_remote_enabled
     match (state.stage, command, reply):
+        case (_, Stop(), Ack()):
+            return replace(state, is_stop_due=False, watchdog=_perhaps_set(state, config))
+        case (_, ReadParameter("W") | WriteParameter("W"), _):
+            return _after_watchdog(state, extra, config, events, is_refused=is_refused)
+        case (Stage.READY, SelectBackup(), Ack()) if state.watchdog is Watchdog.SET:
+            return replace(state, watchdog=Watchdog.UNKNOWN)  # a backup to select may come from a power cycle
         case (Stage.NEW, Identify(), Identity()):
             return replace(state, stage=Stage.IDENTIFIED)
         case (Stage.IDENTIFIED, ReadRegisters(), Registers(tilt_code=tilt_code)):
@@ -64,11 +87,37 @@ def after_reply(state: ControlState, extra: Exchange) -> ControlState:
             Ack(),
         ):
             return replace(state, stage=Stage.SECTOR_FREE)
+        case (Stage.REGISTERS_KNOWN, WriteParameter("S"), Nak()) if is_refused:
+            advice = "the antenna may turn the long way round: set the ACU's parameter S to 0 by hand"
+            events.append(Event("acu.sector_refused", {"advice": advice}, is_warning=True))
+            return replace(state, stage=Stage.SECTOR_FREE)
         case (Stage.SECTOR_FREE, WriteRegisters() as written, Ack()):
             return replace(state, stage=Stage.PRESENT_WRITTEN, present_deg=(written.az_deg, written.el_deg))
         case (Stage.PRESENT_WRITTEN, ReadRegisters(), Registers() as read):
             return replace(state, stage=Stage.READY if _matches(state, read) else Stage.SECTOR_FREE)
     return state
+
+
+def _perhaps_set(state: ControlState, config: ControlConfig) -> Watchdog:
+    """After a STOP the watchdog is cleared also where the link, or a start, was cut off before it was read back."""
+    is_ours = config.register_watchdog_s > 0.0 and state.watchdog is Watchdog.UNKNOWN
+    return Watchdog.SET if is_ours else state.watchdog
+
+
+def _after_watchdog(
+    state: ControlState, extra: Exchange, config: ControlConfig, events: list[Event], *, is_refused: bool
+) -> ControlState:
+    """The watchdog counts as set when it was read back; a clean stop has written 0."""
+    if extra.command == WriteParameter(WATCHDOG, 0):
+        return replace(state, watchdog=Watchdog.UNKNOWN)
+    if extra.reply == Parameter(WATCHDOG, watchdog_code(config)):
+        return replace(state, watchdog=Watchdog.SET, watchdog_try_count=0)
+    count = state.watchdog_try_count + 1
+    if is_refused or count >= WATCHDOG_TRIES:
+        advice = "if this host dies in a loss of signal, the antenna drives to its last command and stays there"
+        events.append(Event("acu.watchdog_refused", {"advice": advice}, is_warning=True))
+        return replace(state, watchdog=Watchdog.REFUSED)
+    return replace(state, watchdog_try_count=count)
 
 
 def _matches(state: ControlState, read: Registers) -> bool:

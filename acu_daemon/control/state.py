@@ -1,10 +1,12 @@
 """What the 10 Hz decision remembers from tick to tick, what it is given, and what it orders.  All frozen."""
 
 from dataclasses import dataclass, field
-from enum import IntEnum
+from enum import IntEnum, StrEnum
 from math import inf
 from typing import Any
 
+from acu_daemon.control.axis_watch import AxesWatch, Bounds
+from acu_daemon.control.encoder_watch import EncoderWatch
 from acu_daemon.control.lag import LagEstimate
 from acu_daemon.control.states import TrackState
 from acu_daemon.model import AxisLimits, FitResult, Prediction, Reading
@@ -31,7 +33,26 @@ class ControlConfig:
     search_s: float = 120.0
     search_along_s: float = 10.0
     search_across_deg: float = 2.0
-    is_armed: bool = True
+    is_armed: bool = True  # at the start; later as people arm and disarm
+    is_shadow: bool = False  # commands nothing, whatever happens
+    register_watchdog_s: float = 0.0  # the ACU's parameter W; 0: it is not touched
+    following: Bounds = Bounds()
+
+
+class Request(StrEnum):
+    """What a person asks of a running daemon."""
+
+    ARM = "arm"
+    DISARM = "disarm"
+    CLEAR = "clear"
+
+
+class Watchdog(IntEnum):
+    """How far the ACU's register watchdog is set."""
+
+    UNKNOWN = 0
+    SET = 1
+    REFUSED = 2  # this ACU has none: asked once, told once
 
 
 class Stage(IntEnum):
@@ -85,7 +106,22 @@ class ControlState:
     refused_tai_s: float = -inf  # the newest refusal of a register write
     refused_until_tai_s: float = -inf
     gate_refusal_count: int = 0
+    gate_clamped_count: int = 0  # followed writes that the gate held back to what the axes can do
     refusal: str = ""  # of the gate, so that only its change is logged
+    arming: bool | None = None  # as people or another hand at the ACU left it; None: as configured
+    disarmed_by: str = ""
+    latch: str = ""  # what an axis did wrong; nothing moves until a person clears it
+    is_stop_due: bool = False  # STOP is sent until it is acknowledged
+    in_force: tuple[float, float, float] | None = None  # the last accepted write: time, continuous azimuth, elevation
+    watchdog: Watchdog = Watchdog.UNKNOWN
+    watchdog_try_count: int = 0
+    axes: AxesWatch = AxesWatch()
+    encoders: EncoderWatch = EncoderWatch()
+
+    def is_armed(self, config: ControlConfig) -> bool:
+        """Whether anything may be written to the ACU."""
+        armed = config.is_armed if self.arming is None else self.arming
+        return armed and not config.is_shadow
 
     def lag_s(self, config: ControlConfig) -> tuple[float, float]:
         """Learned lag of azimuth and elevation, seconds."""
@@ -111,6 +147,7 @@ class Observation:
     refused: Nak | None = None  # the ACU refused the register write
     silence_s: float = 0.0
     must_poll: bool = False  # the last exchange failed: the next command is a poll (ICD section 1)
+    requests: tuple[Request, ...] = ()
     has_room: bool = True  # the computed cycle leaves room for a second exchange beside the write (ICD section 6)
 
 

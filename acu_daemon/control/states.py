@@ -31,6 +31,8 @@ class Cause(StrEnum):
 
     LINK_SILENT = "no valid reply from the ACU"
     LINK_BACK = "the ACU answers"
+    LATCHED = "an axis does not do what it is told: latched until a person clears it"
+    HANDS_OFF = "not armed, and nobody has selected autotrack"
     LOCAL_PANEL = "the local panel took control"
     REMOTE_AGAIN = "remote control is back"
     ACU_FAULT = "the ACU reports a fault"
@@ -77,6 +79,7 @@ class Row:
 TABLE: tuple[Row, ...] = (
     Row(ANY - NO_LINK, Cause.LINK_SILENT, S.LINK_LOST, "0.5 s without a valid reply"),
     Row(NO_LINK, Cause.LINK_BACK, S.IDLE, "first good poll"),
+    Row(ANY - NO_LINK - {S.FAULT}, Cause.LATCHED, S.FAULT),
     Row(ANY - NO_LINK - {S.MANUAL}, Cause.LOCAL_PANEL, S.MANUAL),
     Row(frozenset({S.MANUAL}), Cause.REMOTE_AGAIN, S.IDLE),
     Row(ANY - NO_LINK - {S.MANUAL, S.FAULT}, Cause.ACU_FAULT, S.FAULT),
@@ -84,6 +87,7 @@ TABLE: tuple[Row, ...] = (
     Row(ANY - NO_LINK - {S.MANUAL, S.FAULT, S.STOW}, Cause.STOWING, S.STOW),
     Row(frozenset({S.STOW}), Cause.STOW_LEFT, S.IDLE),
     Row(ACTIVE, Cause.PASS_OVER, S.IDLE, "set of the pass"),
+    Row(ACTIVE, Cause.HANDS_OFF, S.IDLE),
     Row(frozenset({S.IDLE, S.PREPOSITION}), Cause.ACQUIRED_FITTED, S.AUTOTRACK_FITTED),
     Row(frozenset({S.IDLE, S.PREPOSITION}), Cause.ACQUIRED, S.AUTOTRACK_TLE),
     Row(frozenset({S.IDLE}), Cause.STILL_FITTED, S.HOLD_FITTED),

@@ -6,11 +6,15 @@ they take effect, and passes it through the safety gate.  control.state is its m
 
 from dataclasses import replace
 
-from acu_daemon.control.causes import find_causes, is_acquired, path_point
+from acu_daemon.control.absorb import absorb
+from acu_daemon.control.axis_watch import AxesWatch
+from acu_daemon.control.causes import find_causes, path_point
+from acu_daemon.control.fence import fence
 from acu_daemon.control.gate import Passed, gate
+from acu_daemon.control.hands import last_command, let_be, obey, respect_stop, watch_antenna
 from acu_daemon.control.modes import wanted_mode_command
 from acu_daemon.control.search import search_offset, search_pointing
-from acu_daemon.control.start import after_reply, next_command
+from acu_daemon.control.start import next_command
 from acu_daemon.control.state import (
     ControlConfig,
     ControlState,
@@ -20,23 +24,16 @@ from acu_daemon.control.state import (
     Sent,
     Sky,
     Stage,
+    Watchdog,
 )
 from acu_daemon.control.states import ACTIVE, AUTOTRACKING, HOLDING, TrackState, transition
-from acu_daemon.model import Pointing, Reading
-from acu_daemon.pointing.wrap import encoder_continuous, nearest_turn
-from acu_daemon.protocol.angles import LSB_DEG
-from acu_daemon.protocol.messages import AcuMode, Backup, Command, Nak, Poll, Status, WriteAndPoll
-from acu_daemon.units import wrap_180
+from acu_daemon.model import Pointing
+from acu_daemon.pointing.wrap import nearest_turn
+from acu_daemon.protocol.messages import Command, Poll, WriteAndPoll
 
-OFFSET_GAIN = 0.6  # of the newest reading in the smoothed distance to the prediction: autotrack pulls in quickly
-RATE_READINGS = 6  # the rate of an axis is taken over this many readings: near the zenith one pair is all noise
 EXTRA_REPEAT_S = 0.3  # a command gets this long to show in the status before it is sent again
 SETTLE_S = 1.0  # after a change of state the servo takes up the path: what it is short of then is no lag
 CALM_SHARE = 0.25  # of the drive's rate: above it a lag is what the drive cannot do, not what it does late
-STEADY_SHARE = 0.1  # of a step of the registers: more change than that from one to the next is acceleration
-REFUSED_EXTRA_S = 2.0  # after a NAK the same extra command waits this long: no blind repetition
-REFUSED_PAUSE_S = 1.0  # a write that is refused again within REFUSED_AGAIN_S waits this long
-REFUSED_AGAIN_S = 2.0
 
 
 def tick(
@@ -44,125 +41,51 @@ def tick(
 ) -> tuple[ControlState, Orders]:
     """Decide one tick.  now_tai_s: the moment the write starts, so that lateness is no pointing error."""
     events: list[Event] = []
-    state = _absorb(state, seen, sky, now_tai_s, config, events)
+    before = state
+    state = absorb(state, seen, sky, now_tai_s, config, events)
+    state = obey(state, seen.requests, config, events)
+    state = respect_stop(before, state, config, events)
+    state = let_be(watch_antenna(state, seen, config, events))
     state = _walk(state, seen, sky, now_tai_s, config, events)
-    extra = None if seen.must_poll else _extra(state, now_tai_s, config)
+    is_write_owed = before.stage is Stage.READY and bool(before.commands) and before.commands[-1] is None
+    state, orders = _order(state, seen, sky, now_tai_s, config, events, is_write_owed=is_write_owed)
+    return fence(state, orders, config)
+
+
+def _order(
+    state: ControlState,
+    seen: Observation,
+    sky: Sky,
+    now_tai_s: float,
+    config: ControlConfig,
+    events: list[Event],
+    *,
+    is_write_owed: bool,
+) -> tuple[ControlState, Orders]:
+    """is_write_owed: the last tick had an exchange in the place of its write; no two in a row have."""
+    may_write = not seen.must_poll and _may_write(state, now_tai_s, config)
+    is_turn_of_write = is_write_owed and may_write and not seen.has_room
+    extra = None if seen.must_poll or is_turn_of_write else _extra(state, now_tai_s, config)
+    if may_write and (extra is None or seen.has_room):
+        state, write = _write(state, sky, now_tai_s, config, events)
+        return _remember(state, extra, now_tai_s), Orders(write, extra, tuple(events))
+    state = replace(state, commands=(*state.commands[-2:], None))
+    if not state.is_armed(config) and state.track is not TrackState.LINK_LOST:
+        state = replace(_write(state, sky, now_tai_s, config, events)[0], commands=state.commands)
     if extra is not None and not seen.has_room:
-        state = replace(state, commands=(*state.commands[-2:], None))
         return _remember(state, extra, now_tai_s), Orders(extra, None, tuple(events))
-    if seen.must_poll or not _may_write(state, now_tai_s, config):
-        state = replace(state, commands=(*state.commands[-2:], None))
-        return _remember(state, extra, now_tai_s), Orders(Poll(), extra, tuple(events))
-    state, write = _write(state, sky, now_tai_s, config, events)
-    return _remember(state, extra, now_tai_s), Orders(write, extra, tuple(events))
+    return _remember(state, extra, now_tai_s), Orders(Poll(), extra, tuple(events))
 
 
 def _may_write(state: ControlState, now_tai_s: float, config: ControlConfig) -> bool:
     return (
-        config.is_armed
+        state.is_armed(config)
+        and not state.latch
+        and not state.is_stop_due
         and state.stage is Stage.READY
         and state.status is not None
         and state.status.is_remote_enabled
         and now_tai_s >= state.refused_until_tai_s
-    )
-
-
-# What the ACU said
-
-
-def _absorb(
-    state: ControlState, seen: Observation, sky: Sky, now_tai_s: float, config: ControlConfig, events: list[Event]
-) -> ControlState:
-    if seen.extra is not None:
-        state = after_reply(state, seen.extra)
-        if isinstance(seen.extra.reply, Nak):
-            state = replace(state, extra_after_tai_s=now_tai_s + REFUSED_EXTRA_S)
-    if seen.refused is not None:
-        is_again = now_tai_s - state.refused_tai_s < REFUSED_AGAIN_S
-        pause_s = REFUSED_PAUSE_S if is_again else 0.0
-        state = replace(state, refused_tai_s=now_tai_s, refused_until_tai_s=now_tai_s + pause_s)
-        sent = state.commands[-1] if state.commands else None
-        events.append(
-            Event("acu.refused_write", {"az_deg": sent.az_deg, "el_deg": sent.el_deg} if sent else {}, is_warning=True)
-        )
-    if seen.status is not None and seen.reading is not None:
-        state = _absorb_reading(state, seen.status, seen.reading, config)
-        state = _absorb_offset(state, sky, seen.reading)
-    return state
-
-
-def _absorb_reading(state: ControlState, status: Status, reading: Reading, config: ControlConfig) -> ControlState:
-    az_deg = encoder_continuous(status.az_deg, status.is_sector_high, config.azimuth)
-    since = (state.acquired_since_tai_s or reading.tai_s) if is_acquired(status) else None
-    state = _learn_lag(state, az_deg, status.el_deg)
-    return replace(
-        state,
-        stage=_stage_after(state, status),
-        status=status,
-        reading=reading,
-        az_deg=az_deg,
-        track_of_readings=(*state.track_of_readings[1 - RATE_READINGS :], (reading.tai_s, az_deg, status.el_deg)),
-        acquired_since_tai_s=since,
-        has_acquired=state.has_acquired or since is not None,
-        is_stow_kept=_is_stow_kept(state, status),
-    )
-
-
-def _stage_after(state: ControlState, status: Status) -> Stage:
-    """A backup that changed by itself shows a power cycle: the registers, the tilt among them, are read again."""
-    was_remote = state.status is not None and state.status.backup_selected is Backup.REMOTE
-    if state.stage is Stage.READY and was_remote and status.backup_selected is not Backup.REMOTE:
-        return Stage.IDENTIFIED
-    return state.stage
-
-
-def _is_stow_kept(state: ControlState, status: Status) -> bool:
-    """A stow that began after the start is somebody's wish; an antenna found stowed at the start is ours to take."""
-    if status.mode is AcuMode.STOWED:
-        return state.is_stow_kept or (state.status is not None and state.status.mode is not AcuMode.STOWED)
-    return status.mode is AcuMode.STOWING
-
-
-def _learn_lag(state: ControlState, az_deg: float, el_deg: float) -> ControlState:
-    """The newest of three commands is not in force yet when the angles are sampled: learn from the one before it."""
-    if len(state.commands) < 3:
-        return state
-    before, in_force, newest = state.commands[-3:]
-    if before is None or in_force is None or newest is None:
-        return state
-    if not (before.is_free and in_force.is_free and newest.is_free):
-        return state
-    if not (
-        _is_steady(before.az_deg, in_force.az_deg, newest.az_deg)
-        and _is_steady(before.el_deg, in_force.el_deg, newest.el_deg)
-    ):
-        return state
-    return replace(
-        state,
-        lag_az=state.lag_az.seen(in_force.az_deg - before.az_deg, in_force.az_deg - az_deg),
-        lag_el=state.lag_el.seen(in_force.el_deg - before.el_deg, in_force.el_deg - el_deg),
-    )
-
-
-def _is_steady(before_deg: float, in_force_deg: float, newest_deg: float) -> bool:
-    """Whether an axis moves at a nearly constant rate, so that what it is short of is lag, not acceleration."""
-    step_deg, next_deg = in_force_deg - before_deg, newest_deg - in_force_deg
-    return abs(next_deg - step_deg) < STEADY_SHARE * abs(step_deg) + 2 * LSB_DEG
-
-
-def _absorb_offset(state: ControlState, sky: Sky, reading: Reading) -> ControlState:
-    """Follow the distance between reading and prediction while acquired: it carries the path before the first fit."""
-    point = sky.prediction.at(reading.tai_s) if sky.prediction else None
-    if point is None or state.status is None or not is_acquired(state.status):
-        return state
-    az = wrap_180(reading.az_deg - point.az_deg)
-    el = reading.el_deg - point.el_deg
-    if state.offset_az_deg is None:
-        return replace(state, offset_az_deg=az, offset_el_deg=el)
-    return replace(
-        state,
-        offset_az_deg=state.offset_az_deg + OFFSET_GAIN * wrap_180(az - state.offset_az_deg),
-        offset_el_deg=state.offset_el_deg + OFFSET_GAIN * (el - state.offset_el_deg),
     )
 
 
@@ -188,7 +111,9 @@ def _walk(
     )
     state = replace(state, track=track, entered_tai_s=now_tai_s)
     if track is TrackState.LINK_LOST:
+        watchdog = Watchdog.UNKNOWN if state.watchdog is Watchdog.SET else state.watchdog
         state = replace(state, stage=Stage.NEW, last_extra=None, axis_az=None, axis_el=None, commands=())
+        state = replace(state, watchdog=watchdog, axes=AxesWatch())
     if track in HOLDING:
         state = replace(state, hold_from_tai_s=now_tai_s)
     return state
@@ -206,8 +131,8 @@ def _is_sure(sky: Sky, now_tai_s: float, config: ControlConfig) -> bool:
 def _extra(state: ControlState, now_tai_s: float, config: ControlConfig) -> Command | None:
     if state.status is None or not state.status.is_remote_enabled:
         return None
-    wanted = next_command(state, config)
-    if wanted is None and state.stage is Stage.READY:
+    wanted = last_command(state, config) or next_command(state, config)
+    if wanted is None and (state.stage is Stage.READY or state.track is TrackState.FAULT):
         wanted = wanted_mode_command(state)
     if wanted is None or (wanted == state.last_extra and now_tai_s < state.extra_after_tai_s):
         return None
@@ -255,6 +180,7 @@ def _sent(
         last_write_tai_s=now_tai_s,
         commands=(*state.commands[-2:], sent),
         gate_refusal_count=state.gate_refusal_count + bool(passed.refusal),
+        gate_clamped_count=state.gate_clamped_count + (is_followed and passed.is_held_back and not passed.refusal),
     )
     return state, WriteAndPoll(az_deg, el_deg, state.tilt_code)
 

@@ -68,5 +68,10 @@ class Snapshot:
     answered_count: int = 0  # ordered exchanges that the ACU answered
     attempt_count: int = 0  # to open the link
     model: str = ""  # what the prediction is made from
+    arming: str = "armed"  # "disarmed", "shadow"
+    disarmed_by: str = ""
+    latch: str = ""  # what an axis did wrong; cleared by a person
+    encoder_problem: str = ""
+    clamped_count: int = 0  # followed writes that the gate held back to what the axes can do
     rejecting: str = ""  # why the newest readings are not fitted
     rejected_counts: dict[str, int] = field(default_factory=dict)  # readings so far, by reason

@@ -11,7 +11,7 @@ import structlog
 from acu_daemon.assist.gate import Dwell
 from acu_daemon.control.causes import LINK_SILENCE_S, is_acquired
 from acu_daemon.control.doubt import Doubt
-from acu_daemon.control.state import ControlConfig, Event, Exchange, Observation
+from acu_daemon.control.state import ControlConfig, Event, Exchange, Observation, Request, Stage, Watchdog
 from acu_daemon.control.states import AUTOTRACKING
 from acu_daemon.control.tick import tick
 from acu_daemon.daemon.area import CommonArea
@@ -37,6 +37,7 @@ from acu_daemon.protocol.messages import (
 
 CLOCK_STEP_S = 0.1
 DOUBT_EVERY_S = 1.0
+HURRY_SHARE = 0.9  # of the period: the next tick comes on time
 LATENESS_KEPT = 36000  # an hour of ticks
 
 
@@ -63,6 +64,7 @@ class Foreground:
         self._doubt = Doubt(config.azimuth, config.elevation)
         self._doubt_again_s = -math.inf
         self._seen = Observation()
+        self._requests: tuple[Request, ...] = ()
         self._log: Any = structlog.get_logger("tick")
         self.identity: Identity | None = None
         self.tick_count = 0
@@ -87,6 +89,7 @@ class Foreground:
             self._lateness_s[self.tick_count % LATENESS_KEPT] = self._clock.tai_s() - due_tai_s
             self.tick_count += 1
             await self._tick()
+            await self._hurry(due_tai_s)
             if self.tick_count % 10 == 0:
                 self._watch_clock()
             self._after_tick()
@@ -94,10 +97,27 @@ class Foreground:
             self.skipped_tick_count += missed
             due_tai_s = round(due_tai_s / period_s + 1 + missed) * period_s
 
+    async def _hurry(self, due_tai_s: float) -> None:
+        """While the start's exchanges are answered, the next one follows in the same tick if it fits."""
+        end_tai_s, begun_tai_s = due_tai_s + HURRY_SHARE * self._config.period_s, due_tai_s
+        while (
+            self._area.state.stage is not Stage.READY
+            and self._seen.extra is not None
+            and not isinstance(self._seen.extra.reply, Nak | None)
+            and self._port.is_up
+            and not self._port.must_poll
+            and 2.0 * self._clock.tai_s() - begun_tai_s < end_tai_s
+        ):
+            begun_tai_s = self._clock.tai_s()
+            self._after_tick()  # a refused rehearsal ends before the first write
+            await self._port.idle_gap()
+            await self._tick()
+
     async def _tick(self) -> None:
         port, area = self._port, self._area
         port.drop_if_silent(LINK_SILENCE_S)
         seen = replace(self._seen, silence_s=self._silence_s(), must_poll=port.must_poll, has_room=port.has_room)
+        seen, self._requests = replace(seen, requests=self._requests), ()
         now_tai_s = self._clock.tai_s()
         area.state, orders = tick(area.state, seen, area.sky, now_tai_s, self._config)
         self._report(orders.events)
@@ -109,6 +129,10 @@ class Foreground:
         if orders.extra is not None and port.is_up and not port.must_poll:
             await port.idle_gap()
             await self._do(orders.extra)
+
+    def ask(self, request: Request) -> None:
+        """Take a person's request; the next tick obeys."""
+        self._requests = (*self._requests, request)
 
     def _silence_s(self) -> float:
         return self._port.silence_s if self._port.is_up else math.inf
@@ -154,7 +178,8 @@ class Foreground:
             return
         reading = Reading(sample_tai_s, status.az_deg, status.el_deg, is_acquired(status), status.agc_db)
         self._seen = replace(self._seen, status=status, reading=reading)
-        if self._dwell.is_locked(reading) and self._area.state.track in AUTOTRACKING:
+        is_fittable = self._area.state.track in AUTOTRACKING and not self._area.state.encoders.problem
+        if self._dwell.is_locked(reading) and is_fittable:
             self._area.to_fit.append(reading)
         self._area.dwell_count = self._dwell.rejected_count
         if self._on_reading is not None:
@@ -199,6 +224,9 @@ class Foreground:
                 self._log.info("clock.back", difference_s=round(self.clock_difference_s, 4))
 
     async def safe_stop(self) -> bool:
-        """Stop the antenna, unless it never obeyed us.  True: stopped, or nothing to stop."""
-        status = self._area.state.status
-        return self.write_count == 0 or status is None or await stop_antenna(self._port, status)
+        """Stop the antenna, unless it never obeyed us or does so no more.  True: stopped, or nothing to stop."""
+        state, config = self._area.state, self._config
+        if self.write_count == 0 or state.status is None or not state.is_armed(config):
+            return True
+        clears_watchdog = config.register_watchdog_s > 0.0 and state.watchdog is not Watchdog.REFUSED
+        return await stop_antenna(self._port, state.status, clears_watchdog=clears_watchdog)

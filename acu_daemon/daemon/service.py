@@ -11,7 +11,7 @@ import structlog
 from acu_daemon.control.causes import pass_end_tai_s
 from acu_daemon.control.plan import plan_pass
 from acu_daemon.control.refit import RefitSetup
-from acu_daemon.control.state import ControlConfig
+from acu_daemon.control.state import ControlConfig, ControlState, Request
 from acu_daemon.control.states import AUTOTRACKING
 from acu_daemon.daemon.area import CommonArea, Snapshot
 from acu_daemon.daemon.background import Background
@@ -40,6 +40,8 @@ class PassJob:
     device_delay_s: float
     is_rehearsal: bool = False
     end_tai_s: float = math.inf  # of --duration
+    arming: bool | None = None  # as the last run was left, when it was cut off; None: as configured
+    latch: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +58,7 @@ class Outcome:
     refit_count: int
     refit_failed_count: int
     refusal_count: int
+    clamped_count: int
     connect_count: int
     lag_az_s: float
     lag_el_s: float
@@ -76,15 +79,21 @@ class Service:
         on_snapshot: Callable[[Snapshot], None] | None = None,
         on_reading: Callable[[Reading], None] | None = None,
         on_fit: Callable[[FitResult], None] | None = None,
+        on_state: Callable[[ControlState], None] | None = None,
     ) -> None:
         self._job = job
         self._clock = clock
         self._runner = runner
         self._on_snapshot = on_snapshot
+        self._on_state = on_state
         self._ticked = asyncio.Event()
         self._stop_reason = ""
         self._log: Any = structlog.get_logger("pass")
-        self._area = CommonArea()
+        self._area = CommonArea(
+            state=ControlState(
+                arming=job.arming, latch=job.latch, is_stop_due=bool(job.latch) and job.arming is not False
+            )
+        )
         self._port = AcuPort(link, clock, job.address, job.control.period_s, job.device_delay_s)
         self._background = Background(
             self._area,
@@ -194,6 +203,8 @@ class Service:
     def _after_tick(self) -> None:
         self._background.wake()
         self._ticked.set()
+        if self._on_state is not None:
+            self._on_state(self._area.state)
         if self._on_snapshot is not None:
             self._on_snapshot(self.snapshot())
 
@@ -234,6 +245,11 @@ class Service:
             answered_count=self._foreground.answered_count,
             attempt_count=self._port.attempt_count,
             refusal_count=state.gate_refusal_count,
+            clamped_count=state.gate_clamped_count,
+            arming=self._arming(),
+            disarmed_by=state.disarmed_by,
+            latch=state.latch,
+            encoder_problem=state.encoders.problem,
             is_link_up=self._port.is_up,
             link_problem=self._port.problem,
             is_rehearsal=self._job.is_rehearsal,
@@ -242,6 +258,27 @@ class Service:
             rejecting=self._area.gate.rejecting if state.track in AUTOTRACKING else "",
             rejected_counts=self._area.rejected_counts,
         )
+
+    def _arming(self) -> str:
+        if self._job.control.is_shadow:
+            return "shadow"
+        return "armed" if self._area.state.is_armed(self._job.control) else "disarmed"
+
+    def request(self, request: Request) -> str:
+        """Take what a person asks of the running daemon; the next tick obeys.  Returns what to say, `ok` or `error`."""
+        state = self._area.state
+        if request is Request.ARM and self._job.control.is_shadow:
+            return "error this daemon runs with --shadow: it commands nothing; start one without"
+        if request is Request.CLEAR and not state.latch:
+            return "ok nothing is latched"
+        self._foreground.ask(request)
+        if request is Request.ARM and state.latch:
+            return f"ok armed, but latched: {state.latch}; look at the antenna, then `acu-daemon clear`"
+        return {
+            Request.ARM: "ok armed",
+            Request.DISARM: "ok disarmed: STOP is sent if the daemon moves the antenna, then nothing",
+            Request.CLEAR: f"ok cleared: {state.latch}",
+        }[request]
 
     def _outcome(self, reason: str, is_stopped: bool) -> Outcome:
         state, foreground = self._area.state, self._foreground
@@ -258,6 +295,7 @@ class Service:
             refit_count=self._area.refit_count,
             refit_failed_count=self._area.refit_failed_count,
             refusal_count=state.gate_refusal_count,
+            clamped_count=state.gate_clamped_count,
             connect_count=self._port.connect_count,
             lag_az_s=lag_az_s,
             lag_el_s=lag_el_s,

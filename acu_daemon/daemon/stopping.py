@@ -4,28 +4,42 @@ from typing import Any
 
 import structlog
 
+from acu_daemon.control.hands import NO_STOP_MODES
+from acu_daemon.control.start import WATCHDOG
 from acu_daemon.daemon.port import AcuPort
-from acu_daemon.protocol.messages import Ack, AcuMode, Poll, Status, Stop
+from acu_daemon.protocol.messages import Ack, Command, Poll, Status, Stop, WriteParameter
 
-NO_STOP_MODES = (AcuMode.MANUAL, AcuMode.STOWING, AcuMode.STOWED, AcuMode.FAULT)  # a stop would disturb, or do nothing
 ATTEMPTS = 5
 
 
-async def stop_antenna(port: AcuPort, status: Status) -> bool:
-    """Send STOP until it is acknowledged, unless somebody else moves the antenna.  True: stopped, or left alone."""
+async def stop_antenna(port: AcuPort, status: Status, *, clears_watchdog: bool) -> bool:
+    """Send STOP until it is acknowledged, unless somebody else moves the antenna.  True: stopped, or left alone.
+
+    clears_watchdog: then switch the ACU's register watchdog off, so that it does not hinder whoever comes next.
+    """
     log: Any = structlog.get_logger("stop")
+    is_stopped = True
     if status.mode in NO_STOP_MODES or not status.is_remote_enabled:
         log.info("stop.left_alone", mode=status.mode.name)
-        return True
+    elif await _acknowledged(port, Stop()):
+        log.info("stop.done")
+    else:
+        log.warning("stop.unconfirmed", advice="the antenna may still follow its registers: look at the ACU")
+        is_stopped = False
+    if clears_watchdog and is_stopped and status.is_remote_enabled:
+        await _acknowledged(port, WriteParameter(WATCHDOG, 0))
+    return is_stopped
+
+
+async def _acknowledged(port: AcuPort, command: Command) -> bool:
+    """Send a command until it is acknowledged, a few times."""
     for _ in range(ATTEMPTS):
         if port.must_poll:
             await port.exchange(Poll())
             await port.idle_gap()
             continue
-        answer = await port.exchange(Stop())
-        if isinstance(answer.reply, Ack):
-            log.info("stop.done")
-            return True
+        answer = await port.exchange(command)
         await port.idle_gap()
-    log.warning("stop.unconfirmed", advice="the antenna may still follow its registers: look at the ACU")
+        if isinstance(answer.reply, Ack):
+            return True
     return False

@@ -1,0 +1,150 @@
+"""What the ACU said, taken into the memory of the decision: status, reading, replies, refusals.  Pure."""
+
+from dataclasses import replace
+
+from acu_daemon.control.causes import is_acquired
+from acu_daemon.control.encoder_watch import EncoderWatch, watch_encoders
+from acu_daemon.control.start import after_reply
+from acu_daemon.control.state import ControlConfig, ControlState, Event, Observation, Sky, Stage, Watchdog
+from acu_daemon.model import Reading
+from acu_daemon.pointing.wrap import encoder_continuous
+from acu_daemon.protocol.angles import LSB_DEG
+from acu_daemon.protocol.messages import AcuMode, Backup, Nak, Status
+from acu_daemon.units import wrap_180
+
+OFFSET_GAIN = 0.6  # of the newest reading in the smoothed distance to the prediction: autotrack pulls in quickly
+RATE_READINGS = 6  # the rate of an axis is taken over this many readings: near the zenith one pair is all noise
+STEADY_SHARE = 0.1  # of a step of the registers: more change than that from one to the next is acceleration
+REFUSED_EXTRA_S = 2.0  # after a NAK the same extra command waits this long: no blind repetition
+REFUSED_PAUSE_S = 1.0  # a write that is refused again within REFUSED_AGAIN_S waits this long
+REFUSED_AGAIN_S = 2.0
+
+
+def absorb(
+    state: ControlState, seen: Observation, sky: Sky, now_tai_s: float, config: ControlConfig, events: list[Event]
+) -> ControlState:
+    """Take in what the last tick brought; facts for the log are added to events."""
+    if seen.refused is not None:
+        state = _absorb_refusal(state, now_tai_s, events)
+    if seen.status is not None and seen.reading is not None:
+        state = _absorb_in_force(state, seen)
+        state = _absorb_reading(state, seen.status, seen.reading, config)
+        state = _absorb_offset(state, sky, seen.reading)
+        state = _absorb_encoders(state, sky, seen.status, seen.reading, events)
+    if seen.extra is not None:
+        state = after_reply(state, seen.extra, config, events)
+        if isinstance(seen.extra.reply, Nak):
+            state = replace(state, extra_after_tai_s=now_tai_s + REFUSED_EXTRA_S)
+    return state
+
+
+def _absorb_refusal(state: ControlState, now_tai_s: float, events: list[Event]) -> ControlState:
+    is_again = now_tai_s - state.refused_tai_s < REFUSED_AGAIN_S
+    sent = state.commands[-1] if state.commands else None
+    fields = {"az_deg": sent.az_deg, "el_deg": sent.el_deg} if sent else {}
+    events.append(Event("acu.refused_write", fields, is_warning=True))
+    pause_s = REFUSED_PAUSE_S if is_again else 0.0
+    return replace(state, refused_tai_s=now_tai_s, refused_until_tai_s=now_tai_s + pause_s)
+
+
+def _absorb_in_force(state: ControlState, seen: Observation) -> ControlState:
+    """The write that this status answers is what the ACU holds now."""
+    sent = state.commands[-1] if state.commands else None
+    if sent is None or seen.refused is not None or seen.reading is None:
+        return state
+    return replace(state, in_force=(seen.reading.tai_s, sent.az_deg, sent.el_deg))
+
+
+def _absorb_encoders(
+    state: ControlState, sky: Sky, status: Status, reading: Reading, events: list[Event]
+) -> ControlState:
+    """Watch for frozen encoders while autotrack holds the satellite."""
+    path = sky.prediction.at(reading.tai_s) if sky.prediction and is_acquired(status) else None
+    watch = watch_encoders(state.encoders, reading.tai_s, status, path) if path else EncoderWatch()
+    if watch.problem and not state.encoders.problem:
+        events.append(Event("encoder.frozen", {"problem": watch.problem, "action": "not fitted"}, is_warning=True))
+    elif state.encoders.problem and not watch.problem:
+        events.append(Event("encoder.moves"))
+    return replace(state, encoders=watch)
+
+
+def _absorb_reading(state: ControlState, status: Status, reading: Reading, config: ControlConfig) -> ControlState:
+    az_deg = encoder_continuous(status.az_deg, status.is_sector_high, config.azimuth)
+    since = (state.acquired_since_tai_s or reading.tai_s) if is_acquired(status) else None
+    state = _learn_lag(state, az_deg, status.el_deg)
+    return replace(
+        state,
+        stage=_stage_after(state, status),
+        watchdog=_watchdog_after(state, status),
+        status=status,
+        reading=reading,
+        az_deg=az_deg,
+        track_of_readings=(*state.track_of_readings[1 - RATE_READINGS :], (reading.tai_s, az_deg, status.el_deg)),
+        acquired_since_tai_s=since,
+        has_acquired=state.has_acquired or since is not None,
+        is_stow_kept=_is_stow_kept(state, status),
+    )
+
+
+def _stage_after(state: ControlState, status: Status) -> Stage:
+    """A backup that changed by itself shows a power cycle: the registers, the tilt among them, are read again."""
+    was_remote = state.status is not None and state.status.backup_selected is Backup.REMOTE
+    if state.stage is Stage.READY and was_remote and status.backup_selected is not Backup.REMOTE:
+        return Stage.IDENTIFIED
+    return state.stage
+
+
+def _watchdog_after(state: ControlState, status: Status) -> Watchdog:
+    """A power cycle has switched it off."""
+    is_new_start = _stage_after(state, status) is not state.stage
+    return Watchdog.UNKNOWN if is_new_start and state.watchdog is Watchdog.SET else state.watchdog
+
+
+def _is_stow_kept(state: ControlState, status: Status) -> bool:
+    """A stow that began after the start is somebody's wish; an antenna found stowed at the start is ours to take."""
+    if status.mode is AcuMode.STOWED:
+        return state.is_stow_kept or (state.status is not None and state.status.mode is not AcuMode.STOWED)
+    return status.mode is AcuMode.STOWING
+
+
+def _learn_lag(state: ControlState, az_deg: float, el_deg: float) -> ControlState:
+    """The newest of three commands is not in force yet when the angles are sampled: learn from the one before it."""
+    if len(state.commands) < 3:
+        return state
+    before, in_force, newest = state.commands[-3:]
+    if before is None or in_force is None or newest is None:
+        return state
+    if not (before.is_free and in_force.is_free and newest.is_free):
+        return state
+    if not (
+        _is_steady(before.az_deg, in_force.az_deg, newest.az_deg)
+        and _is_steady(before.el_deg, in_force.el_deg, newest.el_deg)
+    ):
+        return state
+    return replace(
+        state,
+        lag_az=state.lag_az.seen(in_force.az_deg - before.az_deg, in_force.az_deg - az_deg),
+        lag_el=state.lag_el.seen(in_force.el_deg - before.el_deg, in_force.el_deg - el_deg),
+    )
+
+
+def _is_steady(before_deg: float, in_force_deg: float, newest_deg: float) -> bool:
+    """Whether an axis moves at a nearly constant rate, so that what it is short of is lag, not acceleration."""
+    step_deg, next_deg = in_force_deg - before_deg, newest_deg - in_force_deg
+    return abs(next_deg - step_deg) < STEADY_SHARE * abs(step_deg) + 2 * LSB_DEG
+
+
+def _absorb_offset(state: ControlState, sky: Sky, reading: Reading) -> ControlState:
+    """Follow the distance between reading and prediction while acquired: it carries the path before the first fit."""
+    point = sky.prediction.at(reading.tai_s) if sky.prediction else None
+    if point is None or state.status is None or not is_acquired(state.status):
+        return state
+    az = wrap_180(reading.az_deg - point.az_deg)
+    el = reading.el_deg - point.el_deg
+    if state.offset_az_deg is None:
+        return replace(state, offset_az_deg=az, offset_el_deg=el)
+    return replace(
+        state,
+        offset_az_deg=state.offset_az_deg + OFFSET_GAIN * wrap_180(az - state.offset_az_deg),
+        offset_el_deg=state.offset_el_deg + OFFSET_GAIN * (el - state.offset_el_deg),
+    )

@@ -1,0 +1,207 @@
+"""Whether each axis does what it is told: one that stands still, runs away or turns the wrong way is found.  Pure.
+
+Azimuth counts as on the sky (times cos el), so the angles of the configuration mean the same at every elevation.
+An axis is judged by a mark: where it was when it last did what was wanted.  A single late, frozen or wild reading moves
+no axis, and what a drive needs to brake, or an encoder to jump, is not held against it.
+"""
+
+from dataclasses import dataclass, replace
+from enum import Enum, auto
+from math import cos, inf, radians
+
+from acu_daemon.model import AxisLimits
+from acu_daemon.protocol.messages import AcuMode, Status
+
+PROGRESS_SHARE = 0.25  # of the following error: an axis that came so much nearer to its command obeys
+AWAY_S = 0.5  # a motion the wrong way must be seen for this long
+BRAKING_MARGIN = 2.0  # a drive may brake with half of its acceleration limit
+FAST_MARGIN = 2.0  # of the drive's rate: faster than that no drive is by its own will
+FAST_S = 1.0
+GAP_S = 1.0  # without a reading for so long, everything begins anew
+LEAST_COS_EL = 0.01
+
+STANDING_MODES = (AcuMode.STANDBY, AcuMode.ACQUIRE, AcuMode.POSITION_MEMORY, AcuMode.STOWED)
+UNWATCHED_MODES = (AcuMode.MANUAL, AcuMode.FAULT, AcuMode.STOWING)  # somebody else's hand, or no drive
+
+
+class Duty(Enum):
+    """What the ACU's mode makes of an axis."""
+
+    FOLLOW = auto()  # the registers
+    STAND = auto()
+    FREE = auto()  # moves by itself: autotrack, rate memory
+    UNWATCHED = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """The configured angle on the sky and time; error_s = 0: nothing is watched."""
+
+    error_deg: float = 1.0
+    error_s: float = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class AxisSeen:
+    """One reading of an axis.  gap_deg: from there to its command; None: not known.  scale: its degrees on the sky."""
+
+    tai_s: float
+    angle_deg: float
+    rate_deg_s: float
+    duty: Duty
+    gap_deg: float | None = None
+    scale: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class AxisWatch:
+    """The memory of one axis: the newest reading, and the mark."""
+
+    last: AxisSeen | None = None
+    side: int = 0  # where the command is, seen from the axis: +1, -1; 0: near enough
+    mark_tai_s: float = -inf
+    mark_deg: float = 0.0
+    wrong_deg_s: float = 0.0  # how fast the axis moved the wrong way at the mark: it may brake
+    wrong_since_tai_s: float = inf
+    fast_since_tai_s: float = inf
+
+
+def duty_of(status: Status) -> Duty:
+    """What the mode asks of the axes (ICD section 5)."""
+    if status.mode in UNWATCHED_MODES or not status.is_remote_enabled:
+        return Duty.UNWATCHED
+    if status.follows_registers:
+        return Duty.FOLLOW
+    return Duty.STAND if status.mode in STANDING_MODES else Duty.FREE
+
+
+def watch_axis(watch: AxisWatch, seen: AxisSeen, limits: AxisLimits, bounds: Bounds) -> tuple[AxisWatch, str]:
+    """Judge one more reading.  Returns what is wrong with the axis, in words; empty: nothing."""
+    last = watch.last
+    if last is not None and seen.tai_s <= last.tai_s:
+        return watch, ""
+    if seen.duty is Duty.UNWATCHED or last is None or _is_new(last, seen, limits, bounds):
+        return _marked(AxisWatch(seen), seen, abs(seen.rate_deg_s)), ""
+    watch = _watch_rate(replace(watch, last=seen), seen, limits, bounds)
+    if seen.tai_s - watch.fast_since_tai_s >= FAST_S:
+        return watch, "moves faster than its drive can"
+    if seen.duty is Duty.STAND:
+        return _watch_standing(watch, seen, limits, bounds)
+    if seen.duty is Duty.FOLLOW and seen.gap_deg is not None:
+        return _watch_following(watch, seen, seen.gap_deg, limits, bounds)
+    return _marked(watch, seen), ""
+
+
+def _is_new(last: AxisSeen, seen: AxisSeen, limits: AxisLimits, bounds: Bounds) -> bool:
+    """Another duty, a pause, or a jump that is the encoder's and not the axis's."""
+    span_s = seen.tai_s - last.tai_s
+    jump_deg = abs(seen.angle_deg - last.angle_deg)
+    is_jump = jump_deg > FAST_MARGIN * limits.max_rate_deg_s * span_s + bounds.error_deg / seen.scale
+    return seen.duty is not last.duty or span_s > GAP_S or is_jump
+
+
+def _marked(watch: AxisWatch, seen: AxisSeen, wrong_deg_s: float = 0.0, side: int = 0) -> AxisWatch:
+    return replace(
+        watch,
+        side=side,
+        mark_tai_s=seen.tai_s,
+        mark_deg=seen.angle_deg,
+        wrong_deg_s=wrong_deg_s,
+        wrong_since_tai_s=inf,
+    )
+
+
+def _watch_rate(watch: AxisWatch, seen: AxisSeen, limits: AxisLimits, bounds: Bounds) -> AxisWatch:
+    most_deg_s = FAST_MARGIN * limits.max_rate_deg_s + bounds.error_deg / seen.scale / AWAY_S
+    is_fast = abs(seen.rate_deg_s) > most_deg_s
+    return replace(watch, fast_since_tai_s=min(watch.fast_since_tai_s, seen.tai_s) if is_fast else inf)
+
+
+def _braking(watch: AxisWatch, limits: AxisLimits) -> tuple[float, float]:
+    """Way and time that an axis needs to brake from its speed at the mark."""
+    braking_deg_s2 = limits.max_acceleration_deg_s2 / BRAKING_MARGIN
+    return watch.wrong_deg_s**2 / (2.0 * braking_deg_s2), watch.wrong_deg_s / braking_deg_s2
+
+
+def _wrong_for_s(watch: AxisWatch, seen: AxisSeen, *, is_wrong: bool) -> tuple[AxisWatch, float]:
+    since_tai_s = min(watch.wrong_since_tai_s, seen.tai_s) if is_wrong else inf
+    return replace(watch, wrong_since_tai_s=since_tai_s), seen.tai_s - since_tai_s
+
+
+def _watch_standing(watch: AxisWatch, seen: AxisSeen, limits: AxisLimits, bounds: Bounds) -> tuple[AxisWatch, str]:
+    braking_deg, braking_s = _braking(watch, limits)
+    moved_deg = abs(seen.angle_deg - watch.mark_deg)
+    is_wrong = moved_deg > bounds.error_deg / seen.scale + braking_deg
+    watch, wrong_s = _wrong_for_s(watch, seen, is_wrong=is_wrong)
+    if is_wrong:
+        return watch, "moves without a command" if wrong_s >= bounds.error_s else ""
+    if seen.tai_s - watch.mark_tai_s > bounds.error_s + braking_s:
+        return _marked(watch, seen), ""
+    return watch, ""
+
+
+def _watch_following(
+    watch: AxisWatch, seen: AxisSeen, gap_deg: float, limits: AxisLimits, bounds: Bounds
+) -> tuple[AxisWatch, str]:
+    error_deg = bounds.error_deg / seen.scale
+    side = 0 if abs(gap_deg) <= error_deg else (1 if gap_deg > 0 else -1)
+    if side == 0:
+        return _marked(watch, seen), ""
+    nearer_deg = side * (seen.angle_deg - watch.mark_deg)
+    if side != watch.side or nearer_deg >= PROGRESS_SHARE * error_deg:
+        return _marked(watch, seen, max(-side * seen.rate_deg_s, 0.0), side), ""
+    braking_deg, braking_s = _braking(watch, limits)
+    watch, wrong_s = _wrong_for_s(watch, seen, is_wrong=nearer_deg < -error_deg - braking_deg)
+    if wrong_s >= AWAY_S:
+        return watch, "moves away from its command"
+    if seen.tai_s - watch.mark_tai_s >= bounds.error_s + braking_s and wrong_s < 0.0:
+        return watch, "stands still away from its command"
+    return watch, ""
+
+
+@dataclass(frozen=True, slots=True)
+class AxesWatch:
+    """The memory of both axes."""
+
+    az: AxisWatch = AxisWatch()
+    el: AxisWatch = AxisWatch()
+
+
+def watch_axes(
+    watch: AxesWatch,
+    status: Status,
+    az: AxisSeen,
+    el: AxisSeen,
+    limits: tuple[AxisLimits, AxisLimits],
+    bounds: Bounds,
+) -> tuple[AxesWatch, str]:
+    """Judge one more reading of both; an axis at a limit switch that its command lies behind is left alone."""
+    new_az, az_problem = watch_axis(
+        watch.az, replace(az, gap_deg=_open(az.gap_deg, *az_ends(status))), limits[0], bounds
+    )
+    new_el, el_problem = watch_axis(
+        watch.el, replace(el, gap_deg=_open(el.gap_deg, *el_ends(status))), limits[1], bounds
+    )
+    problems = [f"{name} {text}" for name, text in (("azimuth", az_problem), ("elevation", el_problem)) if text]
+    return AxesWatch(new_az, new_el), "; ".join(problems)
+
+
+def az_ends(status: Status) -> tuple[bool, bool]:
+    """Whether the azimuth is at its clockwise and at its counter-clockwise limit."""
+    return status.is_at_cw_limit, status.is_at_ccw_limit
+
+
+def el_ends(status: Status) -> tuple[bool, bool]:
+    """Whether the elevation is at its upper and at its lower limit."""
+    return status.is_at_up_limit, status.is_at_down_limit
+
+
+def _open(gap_deg: float | None, is_at_max: bool, is_at_min: bool) -> float | None:
+    if gap_deg is None or (is_at_max and gap_deg > 0.0) or (is_at_min and gap_deg < 0.0):
+        return None
+    return gap_deg
+
+
+def sky_scale(el_deg: float) -> float:
+    """How many degrees on the sky a degree of azimuth is."""
+    return max(cos(radians(el_deg)), LEAST_COS_EL)

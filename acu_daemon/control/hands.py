@@ -1,0 +1,131 @@
+"""Hands on the antenna beside the daemon's: arming, disarming, STOP from elsewhere, the latch of an axis.  Pure.
+
+Disarmed, nothing is written; in mid-pass a STOP goes before that.  A STOP by another hand disarms too.  The latch stays
+until a person clears it, whatever the link and the ACU do meanwhile.
+"""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from acu_daemon.control.axis_watch import AxesWatch, AxisSeen, duty_of, sky_scale, watch_axes
+from acu_daemon.control.start import WATCHDOG
+from acu_daemon.control.state import ControlConfig, ControlState, Event, Observation, Request, Stage, Watchdog
+from acu_daemon.control.states import ACTIVE
+from acu_daemon.protocol.messages import AcuMode, Backup, Command, Status, Stop, WriteParameter
+from acu_daemon.units import wrap_180
+
+NO_STOP_MODES = (AcuMode.MANUAL, AcuMode.STOWING, AcuMode.STOWED, AcuMode.FAULT)  # a stop would disturb, or do nothing
+STOPPED_FROM = (AcuMode.REMOTE, AcuMode.ACQUIRE, AcuMode.AUTOTRACK, AcuMode.REMOTE_BACKUP)
+UNSERVED_S = 0.5  # registers unwritten for so long: STANDBY may be the work of the ACU's own watchdog
+RATE_SPAN_S = 1.0
+
+
+def obey(state: ControlState, requests: Iterable[Request], config: ControlConfig, events: list[Event]) -> ControlState:
+    """Do what people ask."""
+    for request in requests:
+        if request is Request.CLEAR and state.latch:
+            events.append(Event("latch.cleared", {"latch": state.latch}))
+            state = replace(_anew(state), latch="", is_stop_due=False)
+        elif request is Request.ARM and not config.is_shadow and not state.is_armed(config):
+            events.append(Event("armed"))
+            state = replace(_anew(state), arming=True, disarmed_by="", is_stop_due=False)
+        elif request is Request.DISARM and state.is_armed(config):
+            state = _disarm(state, "a person", events)
+            state = replace(state, is_stop_due=state.in_force is not None)
+    return state
+
+
+def _anew(state: ControlState) -> ControlState:
+    """Before the next write the present angles are written, as at a start."""
+    return replace(
+        state,
+        stage=min(state.stage, Stage.REGISTERS_KNOWN),
+        last_extra=None,
+        axis_az=None,
+        axis_el=None,
+        was_followed=False,
+        axes=AxesWatch(),
+        watchdog=state.watchdog if state.watchdog is Watchdog.REFUSED else Watchdog.UNKNOWN,
+    )
+
+
+def _disarm(state: ControlState, by: str, events: list[Event]) -> ControlState:
+    advice = "`acu-daemon arm` goes on"
+    events.append(Event("disarmed", {"by": by, "advice": advice}, is_warning=True))
+    return replace(_anew(state), arming=False, disarmed_by=by, watchdog=state.watchdog)
+
+
+def respect_stop(before: ControlState, state: ControlState, config: ControlConfig, events: list[Event]) -> ControlState:
+    """Take STANDBY out of a tracking mode for a STOP by another hand, unless it looks like a power cycle or a fault.
+
+    Signs of a power cycle: the backup is forgotten.  Of a fault or the register watchdog: a new fault bit, or registers
+    that went unwritten for a while.  before: the memory one tick ago.
+    """
+    was, now = before.status, state.status
+    if was is None or now is None or before.in_force is None or before.reading is None:
+        return state
+    is_ours = state.is_armed(config) and not state.latch and state.stage is Stage.READY and state.track in ACTIVE
+    is_stopped = was.mode in STOPPED_FROM and now.mode is AcuMode.STANDBY and now.backup_selected is Backup.REMOTE
+    is_served = before.reading.tai_s - before.in_force[0] < UNSERVED_S
+    if is_ours and is_stopped and is_served and _faults(now) == _faults(was):
+        return _disarm(state, "another hand that stopped the antenna", events)
+    return state
+
+
+def _faults(status: Status) -> tuple[bool, ...]:
+    return (
+        status.has_azimuth_fault,
+        status.has_elevation_fault,
+        status.has_tilt_fault,
+        status.has_interlock_fault,
+    )
+
+
+def watch_antenna(state: ControlState, seen: Observation, config: ControlConfig, events: list[Event]) -> ControlState:
+    """Judge the axes by a new reading; what they do wrong stops and latches."""
+    if not state.is_armed(config) or state.latch or state.stage is not Stage.READY or config.following.error_s <= 0.0:
+        return state
+    if seen.status is None or seen.reading is None:
+        return state
+    duty, tai_s, el_deg = duty_of(seen.status), seen.reading.tai_s, seen.status.el_deg
+    az_gap_deg = el_gap_deg = None
+    if state.in_force is not None:
+        az_gap_deg, el_gap_deg = wrap_180(state.in_force[1] - state.az_deg), state.in_force[2] - el_deg
+    az_rate_deg_s, el_rate_deg_s = _rates_deg_s(state)
+    axes, problem = watch_axes(
+        state.axes,
+        seen.status,
+        AxisSeen(tai_s, state.az_deg, az_rate_deg_s, duty, az_gap_deg, sky_scale(el_deg)),
+        AxisSeen(tai_s, el_deg, el_rate_deg_s, duty, el_gap_deg),
+        (config.azimuth, config.elevation),
+        config.following,
+    )
+    state = replace(state, axes=axes)
+    if not problem:
+        return state
+    fields = {"problem": problem, "az_deg": state.az_deg, "el_deg": el_deg, "advice": "look, then `acu-daemon clear`"}
+    events.append(Event("axis.latched", fields, is_warning=True))
+    return replace(state, latch=problem, is_stop_due=True)
+
+
+def _rates_deg_s(state: ControlState) -> tuple[float, float]:
+    first, last = state.track_of_readings[0], state.track_of_readings[-1]
+    span_s = last[0] - first[0]
+    if not 0.0 < span_s < RATE_SPAN_S:
+        return 0.0, 0.0
+    return (last[1] - first[1]) / span_s, (last[2] - first[2]) / span_s
+
+
+def last_command(state: ControlState, config: ControlConfig) -> Command | None:
+    """What still goes out of a daemon that is latched or was disarmed: STOP, then the ACU's register watchdog off."""
+    if state.is_stop_due and state.status is not None and state.status.mode not in NO_STOP_MODES:
+        return Stop()
+    if state.watchdog is Watchdog.SET and not state.is_armed(config):
+        return WriteParameter(WATCHDOG, 0)
+    return None
+
+
+def let_be(state: ControlState) -> ControlState:
+    """Owe no STOP to an antenna that somebody else moves by now, or that cannot move."""
+    is_others = state.status is not None and state.status.mode in NO_STOP_MODES
+    return replace(state, is_stop_due=False) if state.is_stop_due and is_others else state
