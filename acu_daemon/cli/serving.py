@@ -68,15 +68,16 @@ async def serve_until_stopped(
             where = await servers.enter_async_context(serve_pty(make_peer, board, place.pty, place.baud))
         else:
             where = await servers.enter_async_context(serve_tcp(make_peer, board, place.host, place.port))
+        said = f"listening {where}\n"
         if control is not None:
             at = await servers.enter_async_context(serve_control(board, *parse_place("--control", control)))
-            sys.stdout.write(f"control {at}\n")
+            said += f"control {at}\n"
         for fault in faults:
             try:
                 board.add(fault)
             except FaultError as error:
                 raise UsageError(f"[[fault]] {error}") from None
-        sys.stdout.write(f"listening {where}\n")
+        sys.stdout.write(said)
         sys.stdout.flush()
         await _until(stopped, beside)
 

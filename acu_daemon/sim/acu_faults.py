@@ -75,6 +75,10 @@ def _false_lock(acu: FakeAcu, _fault: Fault, is_on: bool, _now_tai_s: float) -> 
     acu.antenna.trouble.carrier_deg = acu.antenna.boresight_deg if is_on else None
 
 
+def _silence(acu: FakeAcu, _fault: Fault, is_on: bool, _now_tai_s: float) -> None:
+    acu.antenna.trouble.is_silent = is_on
+
+
 def _axis(change: Callable[[Axis, AxisTrouble, Fault], None]) -> Act:
     """A trouble of the axes that a fault names; its end leaves none."""
 
@@ -123,6 +127,7 @@ _ACTS: dict[VerbName, Act] = {
     "encoder-jump": _slip,
     "encoder-turn": _turn,
     "backlash": _backlash,
+    "silence": _silence,
     "false-lock": _false_lock,
     "limit-switch": _axis(_stop_here),
     "stuck": _axis(_stick),

@@ -43,6 +43,7 @@ class AntennaTrouble:
     slip_az_deg: float = 0.0  # reading minus what it was before
     slip_el_deg: float = 0.0
     is_turn_wrong: bool = False
+    is_silent: bool = False  # the satellite sends nothing
     carrier_deg: tuple[float, float] | None = None  # the receiver hears this direction, and no satellite
     play_deg: tuple[float, float] = (0.0, 0.0)  # between encoder and beam, full width
     _beam_deg: tuple[float, float] | None = None
@@ -136,7 +137,7 @@ class Antenna:
         self.az.move()
         self.el.move()
         self.tilt.move()
-        fade_db, is_silent, is_connected = 0.0, False, True
+        fade_db, is_silent, is_connected = 0.0, self.trouble.is_silent, True
         for start_s, end_s, loss in self._losses:
             if start_s <= tai_s < end_s:
                 fade_db += loss.depth_db

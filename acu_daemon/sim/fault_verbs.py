@@ -10,7 +10,7 @@ LostVerb = Literal["no-reply", "late-reply", "shifted", "glued", "split", "dupli
 GarbledVerb = Literal["bad-checksum", "xor-blind", "swapped-digits", "truncated", "garbage-before", "garbage-after"]
 WrongVerb = Literal["wrong-address", "not-hex", "out-of-range", "nak", "wrong-baud", "break"]
 LineVerb = Literal["cut", "deaf", "half-open", "reset", "slow-close", "accept-then-close", "refuse", "second-client"]
-PanelVerb = Literal["unplug", "power-cycle", "local-panel", "emergency-stop", "false-lock", "encoder-turn"]
+PanelVerb = Literal["unplug", "power-cycle", "local-panel", "emergency-stop", "silence", "false-lock", "encoder-turn"]
 EncoderVerb = Literal["frozen-encoder", "encoder-jump", "backlash", "limit-switch"]
 AxisVerb = Literal["stuck", "runaway", "slow-drive", "reversed", "wind"]
 VerbName = Literal[LostVerb, GarbledVerb, WrongVerb, LineVerb, PanelVerb, EncoderVerb, AxisVerb]
@@ -78,6 +78,7 @@ VERBS: dict[VerbName, Verb] = {
     "reversed": Verb("pedestal", "lasts", "the axis moves the wrong way"),
     "backlash": Verb("pedestal", "lasts", "play between encoder and beam", 0.2, "deg"),
     "wind": Verb("pedestal", "lasts", "gusts push the axis, 1 sigma", 0.5, "deg/s"),
+    "silence": Verb("pedestal", "lasts", "the satellite sends nothing"),
     "false-lock": Verb("pedestal", "lasts", "the receiver locks on a carrier that stands still where the beam is"),
 }
 

@@ -32,7 +32,7 @@ class MemoryLink:
         self._arrivals = Arrivals()
         self._board = board
         self._unread: list[tuple[AcuLine, bytes]] = []
-        self._is_dead = False
+        self._is_dead = self._is_seated = False
         self._taken_until_s = 0.0
         self.is_cut = False
         self.is_refused = False
@@ -71,7 +71,8 @@ class MemoryLink:
             board=self._board,
         )
         is_taken = asyncio.get_running_loop().time() < self._taken_until_s
-        if is_taken or self._suffers("accept-then-close", "second-client"):
+        self._is_seated = not is_taken and not self._suffers("accept-then-close", "second-client")
+        if not self._is_seated:
             self._line.close()
             self._arrivals.fail(LinkRefusedError(f"{self.description} was closed at once: {HELD}"))
 
@@ -107,7 +108,7 @@ class MemoryLink:
         line, self._line = self._line, None
         if line is not None:
             line.close()
-            if self._suffers("slow-close") and self._board is not None:
+            if self._is_seated and self._suffers("slow-close") and self._board is not None:
                 self._taken_until_s = asyncio.get_running_loop().time() + self._board.amount("slow-close")
 
     def _opened(self) -> AcuLine:

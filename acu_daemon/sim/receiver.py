@@ -1,4 +1,9 @@
-"""SIMULATION of the receiver: a Gaussian beam, AGC with noise, acquisition, and the autotrack error signal."""
+"""SIMULATION of the receiver: a beam with its first side lobe, AGC with noise, acquisition, autotrack's error signal.
+
+The side lobe is a ring about the main one, as a circular aperture lit by 1 - r^2 / 2 has it: 1.6 half-power widths off,
+20 dB down, 0.45 wide (Hankel transform).  Autotrack stands still on its crest.  With less than that between peak and
+threshold it is never heard.
+"""
 
 from dataclasses import dataclass
 from math import atan2, cos, degrees, exp, hypot, radians, sin, sqrt
@@ -6,6 +11,7 @@ from random import Random
 from typing import NamedTuple
 
 HALF_POWER_DB = 12.0  # a Gaussian beam is 12 (offset / full half-power width)^2 dB down: 3 dB at half the width
+SIDE_LOBE_BEAMS, SIDE_LOBE_DB, SIDE_LOBE_WIDTH_BEAMS = 1.6, 20.0, 0.45
 HYSTERESIS_DB = 0.5
 TRACKING_NOISE_TIME_S = 0.3  # correlation time of the error signal's noise
 
@@ -30,6 +36,28 @@ def offset_in_beam(az_deg: float, el_deg: float, boresight_az_deg: float, boresi
     across = hypot(right, up)
     scale = degrees(atan2(across, forward)) / across if across > 1e-12 else degrees(1.0)
     return Offset(right * scale, up * scale)
+
+
+def pattern_db(beams: float) -> float:
+    """How far down the pattern is, so many half-power widths off the boresight."""
+    return min(_main_db(beams), _side_lobe_db(beams))
+
+
+def _main_db(beams: float) -> float:
+    return HALF_POWER_DB * beams**2
+
+
+def _side_lobe_db(beams: float) -> float:
+    return SIDE_LOBE_DB + HALF_POWER_DB * ((beams - SIDE_LOBE_BEAMS) / SIDE_LOBE_WIDTH_BEAMS) ** 2
+
+
+def from_crest(offset: Offset, beamwidth_deg: float) -> Offset:
+    """The offset of a direction from the crest of its lobe: of the side lobe along the ring's radius."""
+    beams = offset.angle_deg / beamwidth_deg
+    if _main_db(beams) <= _side_lobe_db(beams):
+        return offset
+    share = 1.0 - SIDE_LOBE_BEAMS / beams
+    return Offset(share * offset.right_deg, share * offset.up_deg)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,14 +91,14 @@ class Receiver:
             return
         level_db = 0.0
         if offset_deg is not None:
-            pattern_db = HALF_POWER_DB * (offset_deg / settings.beamwidth_deg) ** 2
-            level_db = max(0.0, settings.peak_agc_db - pattern_db - fade_db)
+            level_db = max(0.0, settings.peak_agc_db - pattern_db(offset_deg / settings.beamwidth_deg) - fade_db)
         self.agc_db = max(0.0, level_db + self._random.gauss(0.0, settings.agc_noise_db))
         needed_db = threshold_db - HYSTERESIS_DB if self.is_acquired else threshold_db
         self.is_acquired = self.agc_db >= needed_db
 
     def error_signal(self, offset: Offset) -> Offset:
-        """The measured offset; its noise is correlated over TRACKING_NOISE_TIME_S."""
+        """The measured offset from the crest of a lobe; its noise is correlated over TRACKING_NOISE_TIME_S."""
+        offset = from_crest(offset, self._settings.beamwidth_deg)
         if self._renew_deg == 0.0:
             return offset
         gauss, keep = self._random.gauss, self._keep
