@@ -30,7 +30,7 @@ ACU_DAEMON = (sys.executable, "-m", "acu_daemon")
 NOISE_DEG = 0.03
 LOSS_FROM, LOSS_TO = 0.40, 0.75  # of the time benched
 LEAD_S = 4.0  # both processes need this long to start
-BENCH_LEAD_S = 12.0  # and on a busy machine this long: what is late at the start has less to fit before the loss
+STARTS = 4.0  # and on a busy machine this many times what one start takes
 BEFORE_RISE_S = 30.0  # a whole pass begins this long before the rise
 SAY_EVERY_S = 5.0
 
@@ -222,9 +222,17 @@ def rigs(scene: Scene, links: Sequence[str], directory: Path, lead_s: float = LE
             rig.stop()
 
 
+def _lead_s(scene: Scene) -> float:
+    """How long all processes need to start: what is late then has less to fit before the loss."""
+    began_s = time.monotonic()
+    passes = [*ACU_DAEMON, "passes", "--config", str(scene.config), "--from", utc_text(scene.start_tai_s, 0)]
+    subprocess.run(passes, stdout=subprocess.DEVNULL, check=True)
+    return max(LEAD_S, STARTS * (time.monotonic() - began_s))
+
+
 def run_pass(scene: Scene, links: Sequence[str], directory: Path, say: Callable[[str], None] = print) -> list[Rig]:
     """Run the pass, or its window, on every link at once; the rigs' files hold what happened."""
-    with rigs(scene, links, directory, BENCH_LEAD_S) as made:
+    with rigs(scene, links, directory, _lead_s(scene)) as made:
         for rig in made:
             rig.start_acu()
         left_s = scene.end_tai_s - scene.start_tai_s + made[0].at_monotonic_s - time.monotonic()
