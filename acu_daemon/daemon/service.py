@@ -1,9 +1,10 @@
 """One pass from start to safe stop: the tasks, their order, and when it ends."""
 
 import asyncio
+import json
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import structlog
@@ -264,8 +265,15 @@ class Service:
             return "shadow"
         return "armed" if self._area.state.is_armed(self._job.control) else "disarmed"
 
-    def request(self, request: Request) -> str:
-        """Take what a person asks of the running daemon; the next tick obeys.  Returns what to say, `ok` or `error`."""
+    def answer(self, line: str) -> str:
+        """Answer a line of the control socket: `ok ...` or `error ...`; the next tick does what it asks."""
+        if line == "status":
+            return f"ok {json.dumps(asdict(self.snapshot()))}"
+        if line not in set(Request):
+            return f"error {line!r} is unknown, expected status, {', '.join(Request)}"
+        return self._request(Request(line))
+
+    def _request(self, request: Request) -> str:
         state = self._area.state
         if request is Request.ARM and self._job.control.is_shadow:
             return "error this daemon runs with --shadow: it commands nothing; start one without"

@@ -16,14 +16,19 @@ if TYPE_CHECKING:
 
 def state_directory(asked: Path | None, *, is_rehearsal: bool) -> Path:
     """Make and return the directory; a rehearsal has one of its own beside the real one.  UsageError: it cannot."""
-    real = (asked or _default()).resolve()  # so that "." has a name
-    directory = real.parent / f"{real.name}-rehearsal" if is_rehearsal else real
+    directory = state_path(asked, is_rehearsal=is_rehearsal)
     try:
         directory.mkdir(mode=0o750, parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"state directory {directory}: {error.strerror}; choose another with --state DIR") from None
     refuse_world_writable(directory)
     return directory
+
+
+def state_path(asked: Path | None, *, is_rehearsal: bool) -> Path:
+    """Where the directory is, made or not."""
+    real = (asked or _default()).resolve()  # so that "." has a name
+    return real.parent / f"{real.name}-rehearsal" if is_rehearsal else real
 
 
 def refuse_world_writable(directory: Path) -> None:

@@ -1,0 +1,59 @@
+"""`acu-daemon arm`, `disarm`, `clear`, `status`: a person's word to the running daemon, over its control socket."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from acu_daemon.edge.control_socket import ask
+from acu_daemon.edge.state import state_path
+
+State = Annotated[
+    Path | None,
+    typer.Option("--state", metavar="DIR", help="The running daemon's --state, if it was started with one."),
+]
+Rehearsal = Annotated[bool, typer.Option("--rehearsal", help="The daemon that runs as a rehearsal (--at).")]
+
+
+def _say(word: str, state: Path | None, *, is_rehearsal: bool) -> None:
+    typer.echo(ask(state_path(state, is_rehearsal=is_rehearsal), word))
+
+
+def arm(state: State = None, rehearsal: Rehearsal = False) -> None:
+    """Let the running daemon move the antenna.
+
+    Needed after `disarm`, after a STOP by another hand, and with `[safety] arm = "manual"` after every start.
+    It goes on with the pass at once: the present angles are written first, then the path.  `acu-daemon status` tells
+    what it is doing.
+
+    Exit status: 0 armed; 1 no daemon, no permission, or it runs with --shadow.
+    """
+    _say("arm", state, is_rehearsal=rehearsal)
+
+
+def disarm(state: State = None, rehearsal: Rehearsal = False) -> None:
+    """Take the running daemon's hands off the antenna: STOP if it moves it, then nothing but polls.
+
+    It goes on recording, fitting and predicting.  `acu-daemon arm` gives the antenna back.
+
+    Exit status: 0 disarmed; 1 no daemon or no permission.
+    """
+    _say("disarm", state, is_rehearsal=rehearsal)
+
+
+def clear(state: State = None, rehearsal: Rehearsal = False) -> None:
+    """Clear the latch of an axis that stood still, ran away or turned the wrong way.  Look at the antenna first.
+
+    An armed daemon goes on with the pass at once.  If the axis fails again, it is stopped and latched again.
+
+    Exit status: 0 cleared, or nothing was latched; 1 no daemon or no permission.
+    """
+    _say("clear", state, is_rehearsal=rehearsal)
+
+
+def status(state: State = None, rehearsal: Rehearsal = False) -> None:
+    """Print what the running daemon sees and does, as one line of JSON.
+
+    Exit status: 0; 1 no daemon or no permission.
+    """
+    _say("status", state, is_rehearsal=rehearsal)

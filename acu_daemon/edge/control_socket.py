@@ -1,0 +1,138 @@
+"""The control channel of a running daemon: a Unix socket in its state directory, one line in, one line out.
+
+The daemon answers `ok ...` or `error ...`.  Whoever may write to the socket may command: its owner and its group.
+"""
+
+import asyncio
+import contextlib
+import os
+import socket
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from acu_daemon.errors import AcuDaemonError, UsageError
+
+SOCKET = "control.sock"
+MODE = 0o660
+LONGEST_LINE = 256  # bytes
+PATIENCE_S = 2.0  # with a client that says nothing, or does not read
+MOST_CLIENTS = 8
+ANSWER_S = 3.0
+
+
+class ControlSocket:
+    """Listens while the daemon runs; `answer` turns a line into the reply, at once."""
+
+    def __init__(self, directory: Path, answer: Callable[[str], str]) -> None:
+        self._directory = directory
+        self._answer = answer
+        self._server: asyncio.Server | None = None
+        self._client_count = 0
+
+    async def open(self) -> None:
+        """Begin to listen.  UsageError: another daemon runs with this state directory, or it takes no socket."""
+        listener = _listen(self._directory)
+        self._server = await asyncio.start_unix_server(self._serve, sock=listener, limit=LONGEST_LINE)
+
+    async def close(self) -> None:
+        """Stop listening and take the socket away."""
+        if self._server is not None:
+            self._server.close()
+            self._server = None
+            (self._directory / SOCKET).unlink(missing_ok=True)
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._client_count += 1
+        try:
+            async with asyncio.timeout(PATIENCE_S):
+                reply = "error too many clients" if self._client_count > MOST_CLIENTS else await self._reply(reader)
+                writer.write(f"{reply}\n".encode())
+                await writer.drain()
+        except (TimeoutError, OSError):
+            pass
+        finally:
+            self._client_count -= 1
+            writer.close()
+
+    async def _reply(self, reader: asyncio.StreamReader) -> str:
+        try:
+            line = await reader.readline()
+        except ValueError:  # longer than the limit
+            return "error the line is too long"
+        return self._answer(line.decode("ascii", "replace").strip())
+
+
+def ask(directory: Path, line: str) -> str:
+    """Ask the daemon whose state directory this is; returns what stands behind `ok `.
+
+    AcuDaemonError: no daemon, no permission, no answer, or an `error ...`; says what to do.
+    """
+    path = directory / SOCKET
+    try:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
+            client.settimeout(ANSWER_S)
+            with _address(directory) as address:
+                client.connect(address)
+            client.sendall(f"{line}\n".encode())
+            reply = _read(client)
+    except PermissionError:
+        raise AcuDaemonError(f"{path}: not permitted; be the daemon's user or in the group of that file") from None
+    except (FileNotFoundError, NotADirectoryError, ConnectionRefusedError):
+        raise AcuDaemonError(
+            f"{path}: no daemon runs with this state directory; name the --state it was started with "
+            "(--rehearsal for one started with --at), or start it: acu-daemon run"
+        ) from None
+    except OSError as error:
+        raise AcuDaemonError(f"{path}: the daemon does not answer: {error.strerror or error}") from None
+    verdict, _, rest = reply.partition(" ")
+    if verdict != "ok":
+        raise AcuDaemonError(rest or f"{path}: the daemon gave no answer")
+    return rest
+
+
+def _read(client: socket.socket) -> str:
+    parts = []
+    while part := client.recv(65536):
+        parts.append(part)
+    return b"".join(parts).decode().strip()
+
+
+@contextlib.contextmanager
+def _address(directory: Path) -> Iterator[str]:
+    """The socket's address by way of a descriptor of its directory: the path itself may be too long for one."""
+    descriptor = os.open(directory, os.O_PATH | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        yield f"/proc/self/fd/{descriptor}/{SOCKET}"
+    finally:
+        os.close(descriptor)
+
+
+def _listen(directory: Path) -> socket.socket:
+    path = directory / SOCKET
+    if _is_alive(directory):
+        raise UsageError(f"{path}: another daemon runs with this state directory; give each its own --state DIR")
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        path.unlink(missing_ok=True)
+        before = os.umask(0o777 & ~MODE)
+        try:
+            with _address(directory) as address:
+                listener.bind(address)
+        finally:
+            os.umask(before)
+        listener.listen()
+        listener.setblocking(False)
+    except OSError as error:
+        listener.close()
+        raise UsageError(f"{path}: cannot be made: {error.strerror}; choose another place with --state DIR") from None
+    return listener
+
+
+def _is_alive(directory: Path) -> bool:
+    """Whether somebody listens; a socket that a killed daemon left does not count."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe, contextlib.suppress(OSError):
+        probe.settimeout(ANSWER_S)
+        with _address(directory) as address:
+            probe.connect(address)
+        return True
+    return False
