@@ -234,7 +234,7 @@ BURN = replace(LATE, delta_raan_rad=0.4 * DEG)
 def test_a_manoeuvre_shows_within_a_minute_and_what_was_left_is_dropped_with_a_note() -> None:
     truth, tai_s = manoeuvred(BURN)
     readings = shown(truth, WHERE, tai_s, seed=3)
-    estimator = make_estimator("full", SOURCE, WHERE, SETTINGS, CARRIED)
+    estimator = FullEstimator(SOURCE, WHERE, SETTINGS, CARRIED)
     plain = FullEstimator(SOURCE, WHERE, SETTINGS)
     for k in range(0, 75, 5):
         part = Readings(*(one[k : k + 5] for one in (readings.tai_s, readings.az_deg, readings.el_deg)))

@@ -5,7 +5,7 @@ where the next pass is seen by the same station.
 """
 
 from dataclasses import dataclass, field, replace
-from math import hypot
+from math import exp, hypot
 
 import numpy as np
 
@@ -22,8 +22,9 @@ from acu_daemon.assist.full_states import (
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings, StateSigmas
 from acu_daemon.errors import OrbitError
 from acu_daemon.model import AngleBias, Correction, FitResult, Site, Station
+from acu_daemon.orbit.kepler import osculating_from_state
 from acu_daemon.orbit.propagator import Propagator
-from acu_daemon.units import DAY_S, Array
+from acu_daemon.units import DAY_S, EARTH_EQUATORIAL_RADIUS_M, Array
 
 LEAST_READINGS = 30
 LONGEST_S = 10.0 * DAY_S  # after that, new elements' own uncertainty is as good
@@ -33,8 +34,12 @@ SAME_M, SAME_M_S = 1.0, 1e-3
 _MEAN_ANOMALY, _MEAN_MOTION = 1, 2
 _SLOW = (0, 3, 4, 5, 6, 7, 8, 9)  # node, e-vector, inclination, biases: what drifts without a trend
 _SLOW_SHARE_PER_DAY = 0.1  # of the variance of new elements, of a new station's biases
-_WOBBLE_RAD = 1e-4  # 0.7 km along the track come and go within hours: what the analytical theories leave out
-_LONG_MEAN_MOTION_SHARE = 0.4  # of the a-priori sigma: what elements' mean motion is worth from pass to pass
+_WOBBLES = (3e-5, 5e-5, 0.0, 2e-5, 2e-5, 3e-5)  # of the orbit's states, rad: tesseral terms left out, 0.1 to 0.4 km
+_WOBBLE_RAD = 1e-4  # 0.7 km along the track, which come and go within hours, are nothing to carry
+_LONG_MEAN_MOTION_SHARES = (0.08, 0.24)  # of the a-priori sigma, without drag and by drag at 400 km: from pass to pass
+_DRAG_SHARES = (0.03, 0.4)  # of what elements' mean motion loses in worth by the day, likewise
+_DRAG_FALLS_M = 75e3  # the air's density by a factor e, 400 to 800 km
+_MOST_FALLS = 2.0  # below 250 km it no longer rises so
 _LEAST_AGE_S = 0.5 * DAY_S
 
 
@@ -192,6 +197,13 @@ def _element_sigmas(carried: CarryOver, settings: EstimatorSettings) -> ElementS
     return sigmas if isinstance(sigmas, ElementSigmas) else ElementSigmas()
 
 
+def _at_perigee(carried: CarryOver, shares: tuple[float, float]) -> float:
+    """A share without drag and one by drag at 400 km together, as they are at the height of the perigee."""
+    orbit = osculating_from_state(carried.states[:1, :3], carried.states[:1, 3:])
+    height_m = float(orbit.a_m[0] * (1.0 - orbit.e[0])) - EARTH_EQUATORIAL_RADIUS_M
+    return hypot(shares[0], shares[1] * exp(min((400e3 - height_m) / _DRAG_FALLS_M, _MOST_FALLS)))
+
+
 def _held_to_long_mean_motion(mean: Array, carried: CarryOver, settings: EstimatorSettings) -> tuple[Array, Array]:
     """Observe the mean motion's correction as zero.
 
@@ -203,7 +215,8 @@ def _held_to_long_mean_motion(mean: Array, carried: CarryOver, settings: Estimat
         return mean, covariance
     since_s = carried.at_tai_s - carried.elements_epoch_tai_s
     along_rad = mean[_MEAN_ANOMALY] + mean[_MEAN_MOTION] * since_s
-    share_rad_s = _LONG_MEAN_MOTION_SHARE * _element_sigmas(carried, settings).mean_motion_rad_min / 60.0
+    share = _at_perigee(carried, _LONG_MEAN_MOTION_SHARES)
+    share_rad_s = share * _element_sigmas(carried, settings).mean_motion_rad_min / 60.0
     sigma_rad_s = hypot(share_rad_s, float(along_rad) / max(abs(since_s), _LEAST_AGE_S))
     gain = covariance[:, _MEAN_MOTION] / (covariance[_MEAN_MOTION, _MEAN_MOTION] + sigma_rad_s**2)
     return mean - gain * mean[_MEAN_MOTION], covariance - np.outer(gain, covariance[_MEAN_MOTION])
@@ -231,11 +244,12 @@ def _process_noise(carried: CarryOver, settings: EstimatorSettings, fresh_varian
     noise = np.zeros((STATE_COUNT, STATE_COUNT))
     slow = list(_SLOW)
     noise[slow, slow] = _SLOW_SHARE_PER_DAY * passed_s / DAY_S * fresh_variance[slow]
-    noise[_MEAN_ANOMALY, _MEAN_ANOMALY] = _WOBBLE_RAD**2
+    noise[ORBIT, ORBIT] += np.diag(np.square(_WOBBLES))
     drag = np.zeros(STATE_COUNT)  # of a unit of the mean motion's rate: 1/2 t^2 along the track at at_tai_s
     drag[_MEAN_MOTION] = passed_s
     drag[_MEAN_ANOMALY] = passed_s**2 / 2.0 - passed_s * since_epoch_s
-    rate_rad_s2 = _element_sigmas(carried, settings).mean_motion_per_day_rad_min / 60.0 / DAY_S
+    per_day_rad_min = _element_sigmas(carried, settings).mean_motion_per_day_rad_min
+    rate_rad_s2 = _at_perigee(carried, _DRAG_SHARES) * per_day_rad_min / 60.0 / DAY_S
     total: Array = noise + rate_rad_s2**2 * np.outer(drag, drag)
     return total
 
