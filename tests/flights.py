@@ -16,7 +16,7 @@ from acu_daemon.orbit.timescales import gmst_rad, tai_from_utc
 from acu_daemon.protocol.messages import Command, SelectBackup, SelectMode, WriteAndPoll, WriteParameter, WriteRegisters
 from acu_daemon.sim.build import make_sky
 from acu_daemon.sim.fault_verbs import parse_fault
-from acu_daemon.sim.scenario import AcuChoice, Encoder, Loss, Scenario, SkyErrors
+from acu_daemon.sim.scenario import AcuChoice, Encoder, Loss, ReceiverChoice, Scenario, SkyErrors
 from acu_daemon.sim.sky import Sky
 from acu_daemon.sim.trace import TraceRow
 from acu_daemon.units import wrap_180
@@ -77,12 +77,14 @@ def flight_of(
     errors: SkyErrors = WRONG_ORBIT,
     noise_deg: float = NOISE_DEG,
     sky: Sky | None = None,
+    receiver: ReceiverChoice | None = None,
     **parts: Any,
 ) -> Flight:
     """Fly; losses, script and faults (as for a control port) in seconds from the beginning."""
     scenario = Scenario(
         sky=errors,
         encoder=Encoder(noise_deg=noise_deg),
+        receiver=receiver or ReceiverChoice(),
         acu=antenna,
         losses=tuple(loss(begin_tai_s + a, begin_tai_s + b) for a, b in losses),
         faults=tuple(map(parse_fault, faults)),
