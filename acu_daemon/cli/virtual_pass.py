@@ -4,7 +4,7 @@ import asyncio
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +89,7 @@ def fly(
     end_tai_s: float,
     seed: int = 1,
     byte_time_s: float = 0.0,
+    is_shadow: bool = False,
     script: Sequence[tuple[float, Action]] = (),
     make_acu: Callable[[AcuParts], FakeAcu] = FakeAcu,
     make_clock: Callable[[float], LoopClock] = LoopClock,
@@ -124,6 +125,7 @@ def fly(
         for fault in scenario.faults:
             board.add(fault)
         job = make_job(target, coming_pass(target, begin_tai_s), link, is_rehearsal=True, end_tai_s=end_tai_s)
+        job = replace(job, control=replace(job.control, is_shadow=is_shadow))
         service = Service(job, link, clock, make_runner(job.refit), on_snapshot=flight.snapshots.append)
         loop = asyncio.get_running_loop()
         for tai_s, action in script:
