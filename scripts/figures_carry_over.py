@@ -14,36 +14,25 @@ rest after 30 s of lock.
 import argparse
 import json
 import sys
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from real_pass import PASSES, pass_names, truth_path
+from real_pass import pass_names
+from tables.seed_001 import sky_angles_deg
+from tables.skies import Sky, readings_of, real_elements, real_sky
 
 from acu_daemon.assist.carry_over import CarryOver, aged_prior, carry_over_of, first_fit, why_not
 from acu_daemon.assist.encoder import encoder_look, sigma_deg
 from acu_daemon.assist.full import FullEstimator
 from acu_daemon.assist.settings import EstimatorSettings
-from acu_daemon.model import EarthOrientation, FitResult, Readings, Site, Station, sky_angle_deg
+from acu_daemon.model import AngleBias, FitResult, Readings, Site
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator
-from acu_daemon.orbit.tle import parse_tle
-from acu_daemon.sim.sky import read_truth
 from acu_daemon.units import DAY_S, Array
 
 NOISE_DEG = 0.03
 LOCK_S = 30
 SETTINGS = EstimatorSettings(NOISE_DEG, NOISE_DEG)
-
-
-@dataclass(frozen=True)
-class RealPass:
-    """True directions at 1 Hz."""
-
-    name: str
-    site: Site
-    tai_s: Array
-    az_deg: Array
-    el_deg: Array
 
 
 @dataclass(frozen=True)
@@ -64,38 +53,17 @@ class Row:
     carried_after_lock_deg: float
 
 
-def load(name: str) -> RealPass:
-    """Read a pass."""
-    about = json.loads((PASSES / f"{name}.json").read_text())
-    station = Station(about["station"], about["latitude_deg"], about["longitude_deg"], about["height_m"])
-    sky = read_truth(truth_path(name))
-    tai_s = np.arange(sky.start_tai_s, sky.end_tai_s)
-    seen = [sky.direction(float(t)) or (np.nan, np.nan, np.nan) for t in tai_s]
-    az_deg, el_deg, _ = np.array(seen, dtype=np.float64).T
-    return RealPass(name, Site(station, EarthOrientation(ut1_utc_s=about["ut1_utc_s"])), tai_s, az_deg, el_deg)
-
-
 def source_of(name: str, along_s: float) -> Sgp4Propagator:
     """The element set an operator had at a pass, made wrong along the track."""
-    (elements,), _ = parse_tle((PASSES / f"{name}.tle").read_text(), name)
-    wrong = elements.mean_anomaly_rad + along_s * elements.mean_motion_rad_s
-    return Sgp4Propagator(replace(elements, mean_anomaly_rad=wrong))
+    along_rad = along_s * real_elements(name).elements.mean_motion_rad_s
+    return real_elements(name, np.degrees(along_rad))
 
 
-def noisy(real: RealPass, rng: np.random.Generator) -> Readings:
-    """Readings with noise across the elevation and in elevation."""
-    across = NOISE_DEG * rng.standard_normal(real.tai_s.size) / np.cos(np.radians(real.el_deg))
-    return Readings(
-        real.tai_s, (real.az_deg + across) % 360.0, real.el_deg + NOISE_DEG * rng.standard_normal(real.tai_s.size)
-    )
-
-
-def errors_deg(source: Sgp4Propagator, real: RealPass, fit: FitResult | None) -> Array:
+def errors_deg(source: Sgp4Propagator, real: Sky, fit: FitResult | None) -> Array:
     """Prediction against truth over a pass; without a fit the elements' own."""
     corrected = source if fit is None else source.corrected(fit.correction)
     seen = encoder_look(corrected, real.tai_s, real.site, fit)
-    rows = zip(seen.az_deg, seen.el_deg, real.az_deg, real.el_deg, strict=True)
-    return np.array([sky_angle_deg(*map(float, row)) for row in rows])
+    return sky_angles_deg(seen.az_deg, seen.el_deg, real.az_deg, real.el_deg)
 
 
 def fitted(source: Sgp4Propagator, site: Site, readings: Readings, carried: CarryOver | None = None) -> FitResult:
@@ -108,20 +76,22 @@ def fitted(source: Sgp4Propagator, site: Site, readings: Readings, carried: Carr
     return fit
 
 
-def one_run(source: Sgp4Propagator, first: RealPass, second: RealPass, seed: int) -> tuple[float, ...]:
+def one_run(source: Sgp4Propagator, first: Sky, second: Sky, seed: int) -> tuple[float, ...]:
     """The figures of the second pass with one noise: sigma, then AOS, worst and after the lock, plain and carried."""
     rng = np.random.default_rng(seed)
-    carried = carry_over_of(fitted(source, first.site, noisy(first, rng)), source, first.site)
+    carried = carry_over_of(
+        fitted(source, first.site, readings_of(first, AngleBias(), NOISE_DEG, rng)), source, first.site
+    )
     aos_tai_s = float(second.tai_s[0])
     if carried is None or why_not(carried, source, SETTINGS, aos_tai_s):
         raise ValueError(f"{first.name}: nothing to carry over")
     start = first_fit(carried, aged_prior(carried, source, second.site, SETTINGS, aos_tai_s))
     sigma = sigma_deg(source.corrected(start.correction), second.tai_s[:2], second.site, start)
-    all_readings = noisy(second, rng)
-    few = Readings(*(getattr(all_readings, name)[:LOCK_S] for name in ("tai_s", "az_deg", "el_deg")))
+    all_readings = readings_of(second, AngleBias(), NOISE_DEG, rng)
+    few = all_readings.part(slice(LOCK_S))
     figures = [float("nan") if sigma is None else float(sigma[0])]
-    for before, given in ((None, None), (start, carried)):
-        error = errors_deg(source, second, before)
+    for known, given in ((None, None), (start, carried)):
+        error = errors_deg(source, second, known)
         after = errors_deg(source, second, fitted(source, second.site, few, given))[LOCK_S:]
         figures += [float(error[0]), float(error.max()), float(after.max())]
     return tuple(figures)
@@ -142,7 +112,7 @@ def pairs() -> list[tuple[str, str, str]]:
 
 def row_of(first_name: str, second_name: str, elements: str, along_s: float, run_count: int) -> Row:
     """Medians over the runs."""
-    source, first, second = source_of(elements, along_s), load(first_name), load(second_name)
+    source, first, second = source_of(elements, along_s), real_sky(first_name), real_sky(second_name)
     runs = np.median([one_run(source, first, second, seed) for seed in range(run_count)], axis=0).tolist()
     sigma, plain_aos, plain_worst, plain_after, carried_aos, carried_worst, carried_after = runs
     return Row(

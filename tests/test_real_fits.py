@@ -1,4 +1,4 @@
-"""The Kalman filter on real passes, and on made ones: the prediction after a loss against the true sky."""
+"""The Kalman filter and `full` on real passes, and on made ones: the prediction after a loss against the true sky."""
 
 from dataclasses import replace
 
@@ -7,6 +7,7 @@ import pytest
 import real_passes
 from conftest import DATA, needs_data
 from real_passes import noisy, sky_angles_deg
+from script_modules import load
 
 from acu_daemon.assist.estimator import EstimatorSettings, make_estimator
 from acu_daemon.model import Readings, Site, Station
@@ -93,3 +94,31 @@ def test_over_many_orbits_stations_and_passes_the_prediction_stays_inside_the_be
     assert np.median(over_culmination) < 0.03
     assert for_good.max() < 0.1
     assert over_culmination.max() < 0.2
+
+
+@needs_data
+@pytest.mark.parametrize("wrong", ["accurate", "late", "dragged"])
+def test_full_is_as_good_with_elements_90_km_off_as_the_readings_allow(wrong):
+    """First half read, encoders biased: 24 passes of listed low orbits, low to overhead."""
+    half_passes, listed = load("half_passes"), load("tables.listed_passes")
+    trials = [
+        one
+        for seed in np.random.SeedSequence(7).spawn(2)
+        for one in half_passes.listed_trials(getattr(listed, wrong), seed)
+    ]
+    lot = half_passes.lot_of(wrong, trials)
+    assert lot.count == 24
+    assert lot.median_deg < 0.015
+    assert lot.beyond_count <= 1.0 + 2.0 * lot.beyond_expected  # a few low passes tell no more
+    assert lot.worst_deg < 0.06
+    assert lot.median_deg < 1.3 * lot.bound_deg
+    assert lot.one_sigma == pytest.approx(0.39, abs=0.15)  # a pass counts about once
+    assert lot.two_sigma == pytest.approx(0.86, abs=0.12)
+
+
+@needs_data
+def test_the_command_of_the_half_passes_says_every_figure():
+    half_passes = load("half_passes")
+    trials = half_passes.real_trials(real_passes.names()[0], half_passes.BIASED, None, 0.0, 1)
+    text = half_passes.lots_text([half_passes.lot_of("label", trials)])
+    assert f"| label | 1 | {trials[0].worst_deg:.4f} |" in text
