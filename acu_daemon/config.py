@@ -308,6 +308,7 @@ def control_config(station: StationFile, satellite: SatelliteFile, byte_time_s: 
         search_across_deg=station.tracking.search_across_deg,
         is_armed=station.safety.arm == "auto",
         register_watchdog_s=station.safety.register_watchdog_s,
+        clock_alarm_deg=station.safety.clock_alarm_beam_fraction * station.receiver.beamwidth_deg,
         following=Bounds(station.safety.following_error_deg, station.safety.following_error_s),
     )
 

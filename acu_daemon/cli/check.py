@@ -1,6 +1,7 @@
 """`acu-daemon check`: go or no-go before a pass, a line per check."""
 
 import asyncio
+import json
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -93,7 +94,21 @@ def _running(state: Path | None) -> Finding:
     except OSError:
         return Finding(NO_GO, "running daemon", f"{path}: no daemon has written it")
     verdict = GO if age_s < HEALTHY_AGE_S else NO_GO
-    return Finding(verdict, "running daemon", f"{path}: written {age_s:.1f} s ago")
+    alarms = _alarms(path)
+    detail = "; ".join([f"{path}: written {age_s:.1f} s ago", *alarms])
+    return Finding(WARN if alarms and verdict == GO else verdict, "running daemon", detail)
+
+
+def _alarms(snapshot: Path) -> list[str]:
+    """What a person should see to: a latched axis, a daemon that was disarmed, the clock, an encoder."""
+    try:
+        seen = json.loads(snapshot.read_text(encoding="utf-8"))
+        latch, disarmed_by = seen.get("latch", ""), seen.get("disarmed_by", "")
+        others = [seen.get("clock_alarm", ""), seen.get("encoder_problem", "")]
+    except (OSError, ValueError, AttributeError):
+        return []
+    texts = [latch and f"latched: {latch}", disarmed_by and f"disarmed by {disarmed_by}", *others]
+    return [text for text in texts if text]
 
 
 def _clock() -> Finding:

@@ -23,12 +23,14 @@ class Comparison:
     """Estimators by name.
 
     is_held_back: the compared readings are those without lock after the first one with, which no estimator has seen;
-    else those with lock, each predicted from the ones up to a second before.
+    else those with lock, each predicted from the ones up to a second before.  left_out: readings that no fit has seen,
+    by reason.
     """
 
     is_held_back: bool
     errors: dict[str, Errors]
     last_fit: dict[str, FitResult | None]
+    left_out: dict[str, dict[str, int]]
 
     @property
     def line_count(self) -> int:
@@ -47,7 +49,13 @@ def compare(
         is_held_back=is_held_back,
         errors={name: _errors(lines, one, chosen) for name, one in results.items()},
         last_fit={name: one[-1].fit if one else None for name, one in results.items()},
+        left_out={name: one[-1].left_out if one else {} for name, one in results.items()},
     )
+
+
+def what_is_left_out(counts: dict[str, int]) -> str:
+    """Counts by reason, the most frequent first, in one line."""
+    return ", ".join(f"{counts[one]} {one}" for one in sorted(counts, key=lambda one: -counts[one])) or "none"
 
 
 def _kinds(lines: list[tuple[float, Reading | None]], lock_dwell_s: float) -> tuple[list[int], list[int]]:

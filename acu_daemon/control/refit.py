@@ -85,6 +85,7 @@ class Refitter:
         self._resumed = before_fit(setup, setup.carried.at_tai_s) if setup.carried and setup.is_resumed else None
         self._gate = TrackGate(setup.propagator, setup.site, setup.settings)
         self._choice = ModelChoice()
+        self._said: set[str] = set()
         self._begin_fit()
 
     def refit(self, request: RefitRequest) -> RefitReply:
@@ -146,13 +147,17 @@ class Refitter:
         notes, self._estimator.notes[:] = tuple(self._estimator.notes), ()
         if notes:  # the readings denied what was carried over
             self._carried = self._resumed = None
-        return notes
+        new = tuple(note for note in notes if note not in self._said)  # an estimator made afresh finds the same again
+        self._said.update(new)
+        return new
 
     def _models(self, now_tai_s: float) -> dict[Model, FitResult | None]:
         """The models there are, each with what it adds to the elements."""
         models: dict[Model, FitResult | None] = {Model.ELEMENTS: None}
         if self._carried is not None and self._resumed is None:
-            models[Model.LAST_PASS] = before_fit(self._setup, now_tai_s)
+            last_pass = before_fit(self._setup, now_tai_s)
+            if last_pass is not None:
+                models[Model.LAST_PASS] = last_pass
         fit = self._estimator.fit() or self._resumed
         if fit is not None:
             models[Model.NEW_FIT] = fit

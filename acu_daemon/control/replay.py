@@ -1,11 +1,11 @@
 """Recorded readings through the same fit and prediction as the daemon's (design section 8, `replay`).  Pure."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from acu_daemon.assist.gate import Dwell
+from acu_daemon.assist.gate import DWELL, Dwell
 from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup, Refitter
 from acu_daemon.control.states import TrackState
 from acu_daemon.model import FitResult, Reading, Readings
@@ -16,13 +16,17 @@ REFIT_PERIOD_S = 0.5  # at any rate of readings, a refit then comes at least onc
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """What the daemon would have predicted for an instant: encoder frame, azimuth in [0, 360)."""
+    """What the daemon would have predicted for an instant: encoder frame, azimuth in [0, 360).
+
+    left_out: readings that no fit has seen so far, by reason, as of the newest fit.
+    """
 
     az_deg: float
     el_deg: float
     sigma_deg: float | None
     source: TrackState
     fit: FitResult | None = None  # the newest one then
+    left_out: dict[str, int] = field(default_factory=dict)
 
 
 def replay(
@@ -41,6 +45,7 @@ def replay(
     waiting: list[Reading] = []
     refitted_tai_s = -np.inf
     current: RefitReply | None = None
+    left_out: dict[str, int] = {}
     has_acquired = False
     for count, (tai_s, reading) in enumerate(lines):
         is_acquired = reading is not None and reading.is_locked
@@ -51,7 +56,8 @@ def replay(
             refitted_tai_s = waiting[-1].tai_s if waiting else refitted_tai_s
             current = refitter.refit(_request(waiting, tai_s))
             waiting = []
-        yield _line(current, tai_s, _state(current.prediction.kind == "FITTED", is_acquired, has_acquired))
+            left_out = _left_out(current, dwell)
+        yield _line(current, tai_s, _state(current.prediction.kind == "FITTED", is_acquired, has_acquired), left_out)
         if reading is not None and dwell.is_locked(reading):
             waiting.append(reading)
         if on_progress is not None and count % 100 == 0:
@@ -68,7 +74,12 @@ def _request(waiting: list[Reading], tai_s: float) -> RefitRequest:
     )
 
 
-def _line(reply: RefitReply, tai_s: float, source: TrackState) -> Replayed:
+def _left_out(reply: RefitReply, dwell: Dwell) -> dict[str, int]:
+    counts = {DWELL: dwell.rejected_count, **reply.gate.counts}
+    return {reason: count for reason, count in counts.items() if count}
+
+
+def _line(reply: RefitReply, tai_s: float, source: TrackState, left_out: dict[str, int]) -> Replayed:
     prediction = reply.prediction
     point = prediction.at(tai_s)
     if point is None:
@@ -77,7 +88,7 @@ def _line(reply: RefitReply, tai_s: float, source: TrackState) -> Replayed:
     if prediction.sigma_deg is not None:
         index = min(round((tai_s - prediction.start_tai_s) / prediction.step_s), prediction.sigma_deg.size - 1)
         sigma_deg = float(prediction.sigma_deg[index])
-    return Replayed(point.az_deg % 360.0, point.el_deg, sigma_deg, source, reply.fit)
+    return Replayed(point.az_deg % 360.0, point.el_deg, sigma_deg, source, reply.fit, left_out)
 
 
 def _state(is_fitted: bool, is_acquired: bool, has_acquired: bool) -> TrackState:

@@ -37,6 +37,7 @@ class ControlConfig:
     is_shadow: bool = False  # commands nothing, whatever happens
     register_watchdog_s: float = 0.0  # the ACU's parameter W; 0: it is not touched
     following: Bounds = Bounds()
+    clock_alarm_deg: float = 0.1  # an error of UTC counts from here on, at the sky's present rate
 
 
 class Request(StrEnum):

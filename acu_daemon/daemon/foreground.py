@@ -15,6 +15,7 @@ from acu_daemon.control.state import ControlConfig, Event, Exchange, Observation
 from acu_daemon.control.states import AUTOTRACKING
 from acu_daemon.control.tick import tick
 from acu_daemon.daemon.area import CommonArea
+from acu_daemon.daemon.clock_watch import ClockWatch
 from acu_daemon.daemon.port import AcuPort, Answer
 from acu_daemon.daemon.stopping import stop_antenna
 from acu_daemon.edge.clock import Clock
@@ -35,7 +36,6 @@ from acu_daemon.protocol.messages import (
     command_text,
 )
 
-CLOCK_STEP_S = 0.1
 DOUBT_EVERY_S = 1.0
 HURRY_SHARE = 0.9  # of the period: the next tick comes on time
 LATENESS_KEPT = 36000  # an hour of ticks
@@ -71,8 +71,7 @@ class Foreground:
         self.write_count = 0
         self.answered_count = 0  # ordered exchanges that were answered: the work that the watchdog asks for
         self.skipped_tick_count = 0
-        self.clock_difference_s = 0.0
-        self._is_clock_stepped = False
+        self.clock_watch = ClockWatch(clock, config.clock_alarm_deg)
         self._lateness_s = np.zeros(LATENESS_KEPT)
 
     @property
@@ -91,7 +90,7 @@ class Foreground:
             await self._tick()
             await self._hurry(due_tai_s)
             if self.tick_count % 10 == 0:
-                self._watch_clock()
+                self.clock_watch.look(self._area.sky.prediction)
             self._after_tick()
             missed = max(0, math.floor((self._clock.tai_s() - due_tai_s) / period_s))
             self.skipped_tick_count += missed
@@ -207,21 +206,6 @@ class Foreground:
             answer.reply, Ack
         ):
             self._log.info("acu.command", command=command_text(command))
-
-    def _watch_clock(self) -> None:
-        """Follow the system clock slowly; a step is reported once and not obeyed."""
-        self.clock_difference_s = self._clock.follow()
-        is_stepped = abs(self.clock_difference_s) > CLOCK_STEP_S
-        if is_stepped != self._is_clock_stepped:
-            self._is_clock_stepped = is_stepped
-            if is_stepped:
-                self._log.warning(
-                    "clock.stepped",
-                    difference_s=round(self.clock_difference_s, 3),
-                    action="not obeyed until the next start",
-                )
-            else:
-                self._log.info("clock.back", difference_s=round(self.clock_difference_s, 4))
 
     async def safe_stop(self) -> bool:
         """Stop the antenna, unless it never obeyed us or does so no more.  True: stopped, or nothing to stop."""

@@ -250,6 +250,7 @@ class Service:
             arming=self._arming(),
             disarmed_by=state.disarmed_by,
             latch=state.latch,
+            clock_alarm=self._foreground.clock_watch.alarm,
             encoder_problem=state.encoders.problem,
             is_link_up=self._port.is_up,
             link_problem=self._port.problem,

@@ -11,6 +11,7 @@ from typing import Protocol
 from acu_daemon.orbit.timescales import tai_from_unix
 
 STEP_S = 0.1  # a jump of the system clock larger than this is reported and not obeyed
+ASK_EVERY_S = 30.0
 FOLLOW_GAIN = 0.02  # of the difference to the system clock, each second: a drift is followed, a step is not
 
 _LIBC = ctypes.CDLL(None, use_errno=True)
@@ -22,7 +23,9 @@ _NONBLOCK_CLOEXEC = os.O_NONBLOCK | os.O_CLOEXEC
 
 
 class Clock(Protocol):
-    """Seam between the daemon and time."""
+    """Seam between the daemon and time.  is_synchronised: of the system clock; None: nobody could tell, or needs to."""
+
+    is_synchronised: bool | None
 
     def monotonic_s(self) -> float: ...
 
@@ -75,6 +78,7 @@ class SystemClock:
 
     def __init__(self, at_tai_s: float | None = None, at_monotonic_s: float | None = None) -> None:
         self.is_rehearsal = at_tai_s is not None
+        self.is_synchronised: bool | None = None
         if at_tai_s is None:
             self._offset_s = _system_offset_s()
         else:
@@ -105,9 +109,17 @@ class SystemClock:
             self._timer.close()
             self._timer = None
 
+    async def watch_synchronisation(self) -> None:
+        """Ask now and then whether the system clock is synchronised, beside the loop: the answer may take a second."""
+        while not self.is_rehearsal:
+            self.is_synchronised = await asyncio.to_thread(is_clock_synchronised)
+            await asyncio.sleep(ASK_EVERY_S)
+
 
 class LoopClock:
     """The running loop's own time, for tests in virtual time: TAI is at_tai_s when the clock is made."""
+
+    is_synchronised: bool | None = None
 
     def __init__(self, at_tai_s: float) -> None:
         self._loop = asyncio.get_running_loop()

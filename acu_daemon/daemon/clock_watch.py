@@ -1,0 +1,54 @@
+"""Watches the clock once a second: a system clock that is not synchronised, stepped, or too far from ours, is an alarm.
+
+UTC follows the system clock slowly (edge.clock).  A step is reported and not obeyed before the next start: in mid-pass
+it would throw the beam off, and nobody can know which of the two clocks is right.
+"""
+
+from math import cos, hypot, radians
+from typing import Any
+
+import structlog
+
+from acu_daemon.edge.clock import STEP_S, Clock
+from acu_daemon.model import Prediction
+
+
+class ClockWatch:
+    """The alarm, empty while all is well; only its changes are logged."""
+
+    def __init__(self, clock: Clock, alarm_deg: float) -> None:
+        self._clock = clock
+        self._alarm_deg = alarm_deg
+        self._kind = ""
+        self._log: Any = structlog.get_logger("clock")
+        self.alarm = ""
+        self.difference_s = 0.0
+
+    def look(self, prediction: Prediction | None) -> None:
+        """Follow the system clock for one second; prediction: how fast the satellite moves now."""
+        self.difference_s = self._clock.follow()
+        kind, self.alarm = self._judge(_sky_rate_deg_s(prediction, self._clock.tai_s()))
+        if kind == self._kind:
+            return
+        if kind:
+            self._log.warning(f"clock.{kind}", difference_s=round(self.difference_s, 4), alarm=self.alarm)
+        else:
+            self._log.info("clock.back", difference_s=round(self.difference_s, 4))
+        self._kind = kind
+
+    def _judge(self, rate_deg_s: float) -> tuple[str, str]:
+        if abs(self.difference_s) > STEP_S:
+            return "stepped", f"the system clock stepped by {self.difference_s:+.3f} s: not obeyed until the next start"
+        off_deg = abs(self.difference_s) * rate_deg_s
+        if off_deg > self._alarm_deg:
+            return "off", f"UTC is off by {self.difference_s:+.3f} s: {off_deg:.3f} deg at the present rate"
+        if self._clock.is_synchronised is False:
+            return "unsynchronised", "the system clock is not synchronised: start chrony or ntpd"
+        return "", ""
+
+
+def _sky_rate_deg_s(prediction: Prediction | None, now_tai_s: float) -> float:
+    point = prediction.at(now_tai_s) if prediction is not None else None
+    if point is None:
+        return 0.0
+    return hypot(point.az_rate_deg_s * cos(radians(point.el_deg)), point.el_rate_deg_s)
