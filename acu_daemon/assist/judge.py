@@ -46,7 +46,7 @@ class Judge:
         self._source, self._site, self._settings = source, site, settings
 
     def best_offsets(self, readings: Readings, factor: float) -> Offsets | None:
-        """Offsets from the orbit that fits the readings best, with its sigmas factor times as large; None without one."""
+        """Offsets from the orbit that fits the readings, its sigmas factor times as large; None without one."""
         settings = widened(self._source, self._settings, factor)
         estimator = FullEstimator(self._source, self._site, settings)
         try:

@@ -4,21 +4,23 @@ A reading near the path of the fit is kept.  Readings off it wait: they are kept
 goes through them and the readings kept before (the path was extrapolated badly), and they take the place of those kept
 before once they alone have obeyed such an orbit for long enough (what was believed first was wrong).  Before anything
 is kept, readings are the satellite's if an orbit near the elements goes through them.  A track that leaves the path
-without a jump takes with it what was kept since it left.
+without a jump takes with it what was kept since it left.  Readings near the path that wander about it, as those of an
+axis that hunts, are left out.
 """
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from acu_daemon.assist.calm import Calm
+from acu_daemon.assist.calm import is_calm
 from acu_daemon.assist.gate import ACCELERATION, BELIED, OFF_PATH, WRONG_TARGET, ReadingGate
 from acu_daemon.assist.judge import Judge
 from acu_daemon.assist.offsets import Offsets, offsets
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.assist.spans import seconds, span_s, tail_of
 from acu_daemon.assist.strangers import LOW_DB, is_weak_beside, left_path_tai_s, reason_of, rise_db
+from acu_daemon.assist.wander import Wander
 from acu_daemon.model import FitResult, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
 
@@ -62,8 +64,8 @@ class TrackGate:
             settings.azimuth,
             settings.elevation,
         )
-        self._calm = Calm(settings)
         self._judge = Judge(source, site, settings)
+        self._wander = Wander(self._judge, settings)
         self._kept: list[Readings] = []
         self._waiting = _NONE
         self._waiting_reason = ""
@@ -105,13 +107,19 @@ class TrackGate:
         taken = Taken()
         if len(good):
             seen = self._offsets(good, fit)
-            is_calm = self._calm.is_calm(seen, has_path=fit is not None)
-            reasons[ACCELERATION] = self._leave_out(good.part(~is_calm), ACCELERATION)
+            calm = is_calm(seen, self._settings)
+            reasons[ACCELERATION] = self._leave_out(good.part(~calm), ACCELERATION)
             if fit is None:
-                taken = self._first(good.part(is_calm))
+                taken = self._first(good.part(calm))
             else:
-                is_near = seen.is_near & ~is_weak_beside(seen, good, self.kept, self._settings.beamwidth_deg)
-                taken = self._follow(good.part(is_calm & is_near), good.part(is_calm & ~is_near), fit)
+                is_strong = calm & ~is_weak_beside(seen, good, self.kept, self._settings.beamwidth_deg)
+                is_asked = is_strong & self._wander.is_within(seen)
+                if self._wanders(good.part(is_asked), fit):
+                    reasons[self._wander.reason] += self._leave_out(good.part(is_asked), self._wander.reason)
+                    taken = self._leave_wanderers(good.part(calm & ~is_asked), fit)
+                else:
+                    is_near = is_strong & seen.is_near
+                    taken = self._follow(good.part(is_near), good.part(calm & ~is_near), fit)
         reasons[self._waiting_reason] += int(np.count_nonzero(self._waiting.tai_s >= readings.tai_s[0]))
         self.rejecting = max(reasons, key=lambda one: reasons[one]) if 2 * reasons.total() > len(readings) else ""
         return taken
@@ -185,6 +193,22 @@ class TrackGate:
         if (judged := self._judge.verdict(tail_of(self.kept, JUDGED_S), tail, NARROW)) is not None:
             return self._believe(tail, judged)
         return Taken(near, is_rebuilt or self._resets())
+
+    def _wanders(self, asked: Readings, fit: FitResult) -> bool:
+        """Whether the readings, with those before them, wander about the path; a fit to few cannot tell."""
+        if len(asked) == 0:
+            return False
+        recent = self._wander.asked(asked)
+        path = replace(fit, covariance=None)  # its sigma is of no use here, and slow
+        return seconds(self.kept) >= YOUNG_S and self._wander.denies(self.kept, self._offsets(recent, path))
+
+    def _leave_wanderers(self, off: Readings, fit: FitResult) -> Taken:
+        """Leave out what was kept of the window that wanders; go on with the readings farther off."""
+        is_theirs = self.kept.tai_s >= self._wander.begin_tai_s
+        has_some = self._leave_out(self.kept.part(is_theirs), self._wander.reason) > 0
+        self._kept = [self.kept.part(~is_theirs)]
+        taken = self._follow(_NONE, off, fit)
+        return replace(taken, is_rebuilt=taken.is_rebuilt or has_some)
 
     def _take_back(self, seen: Offsets, fit: FitResult) -> bool:
         """Take what was kept last from a track that left the path without a jump: it was on its way already."""

@@ -1,0 +1,118 @@
+"""Whether readings wander about their path: an axis that hunts, or a track that is drawn off it slowly.  Pure.
+
+White noise of any size averages out; what keeps its sign from reading to reading does not, and an orbit cannot follow
+it.  So the measure is the mean product of offsets that follow each other, against that of the readings believed.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from acu_daemon.assist.gate import ACCELERATION, OFF_PATH
+from acu_daemon.assist.judge import Judge
+from acu_daemon.assist.offsets import Flags, Offsets
+from acu_daemon.assist.settings import EstimatorSettings
+from acu_daemon.model import Readings
+
+WINDOW_S, WINDOW_COUNT = 3.0, 8  # both at least
+BEFORE_S = 120.0
+FACTOR = 2.0  # of the noise squared, and of what the readings believed show
+REACH = 2.0  # times as far off as is near an axis may hunt
+TURNING_S, TURNING_SHARE = 20.0, 0.3  # so much of the wander is left without its trend: an axis that hunts
+LONGEST_S = 75.0  # then such readings are better than none
+_NONE = Readings.of([])
+
+
+def wander_deg2(seen: Offsets) -> float:
+    """The mean product of offsets that follow each other: 0 for white noise, the mean square for what lasts."""
+    right, up = seen.right_deg, seen.up_deg
+    return float(right[1:] @ right[:-1] + up[1:] @ up[:-1]) / (right.size - 1)
+
+
+class Wander:
+    """Takes readings off the path by little, oldest first.  Mutable; one owner.
+
+    reason: of the newest readings, "" while they do not wander.  begin_tai_s: since when the newest ones do.
+    """
+
+    def __init__(self, judge: Judge, settings: EstimatorSettings) -> None:
+        self._judge, self._settings = judge, settings
+        self._recent = _NONE
+        self._since_tai_s: float | None = None
+        self.reason = ""
+        self.begin_tai_s = np.inf
+
+    def is_within(self, seen: Offsets) -> Flags:
+        """Which readings to ask about: the near ones; while others wander, those farther off too."""
+        within: Flags = seen.angle_deg <= (REACH if self.reason else 1.0) * seen.near_deg
+        return within
+
+    def asked(self, readings: Readings) -> Readings:
+        """Take the next readings; give them with those before them: what `denies` asks about."""
+        recent = Readings.joined([self._recent, readings])
+        count = max(WINDOW_COUNT, int(np.count_nonzero(recent.tai_s > recent.tai_s[-1] - TURNING_S)), len(readings))
+        self._recent = recent.part(slice(-count, None))
+        return self._recent
+
+    def denies(self, kept: Readings, seen: Offsets) -> bool:
+        """Say whether the newest readings wander.  seen: offsets of those asked about from the fit to the kept ones.
+
+        Where they wander about the path as it was extrapolated, the orbit through them and those kept decides.
+        """
+        newest_s = seen.tai_s[-1] - WINDOW_S
+        newest = seen.part(slice(-max(WINDOW_COUNT, int(np.count_nonzero(seen.tai_s > newest_s))), None))
+        self.reason = self._reason(kept, seen, newest)
+        if not self.reason:
+            self._since_tai_s = None
+            return False
+        if self._since_tai_s is None:
+            self._since_tai_s = self.begin_tai_s = self._begin_tai_s(newest)
+        return float(seen.tai_s[-1]) < self._since_tai_s + LONGEST_S
+
+    def _noise_deg2(self) -> float:
+        return self._settings.sigma_azimuth_deg**2 + self._settings.sigma_elevation_deg**2
+
+    def _reason(self, kept: Readings, seen: Offsets, newest: Offsets) -> str:
+        if newest.tai_s.size < WINDOW_COUNT or wander_deg2(newest) <= FACTOR * self._noise_deg2():
+            return ""
+        count = int(np.count_nonzero(seen.tai_s >= self.begin_tai_s)) if self.reason else 0
+        window = self._recent.part(slice(-max(count, newest.tai_s.size), None))
+        before = kept.part((kept.tai_s < window.tai_s[0]) & (kept.tai_s > window.tai_s[0] - BEFORE_S))
+        if len(before) < WINDOW_COUNT:
+            return ""
+        together = self._judge.best_offsets(Readings.joined([before, window]), 1.0)
+        if together is None:
+            return ""
+        old, new = together.part(slice(None, len(before))), together.part(slice(len(before), None))
+        if wander_deg2(new) <= FACTOR * max(self._noise_deg2(), _noise_seen_deg2(old), wander_deg2(old)):
+            return ""
+        whole = seen.part(slice(-len(window), None))
+        return ACCELERATION if wander_deg2(_turning(whole)) > TURNING_SHARE * wander_deg2(whole) else OFF_PATH
+
+    def _begin_tai_s(self, seen: Offsets) -> float:
+        """Where the readings become more than noise: the most likely instant; where they drift, when that began."""
+        noise_deg2 = self._noise_deg2()
+        square = seen.angle_deg**2 / noise_deg2
+        count = np.arange(square.size, 0, -1)
+        later = np.cumsum(square[::-1])[::-1] / count
+        cost = np.cumsum(square) - square + count * (1.0 + np.log(np.maximum(later, 1.0)))
+        wandering = seen.part(slice(int(np.argmin(cost)), None))
+        first_tai_s = float(wandering.tai_s[0])
+        right, up = wandering.drift_deg_s(WINDOW_S)
+        if self.reason != OFF_PATH or right == up == 0.0:
+            return first_tai_s
+        off = float(np.mean(wandering.right_deg) * right + np.mean(wandering.up_deg) * up)
+        on_path_tai_s = float(np.mean(wandering.tai_s)) - off / (right * right + up * up)
+        return min(max(on_path_tai_s, first_tai_s - WINDOW_S), first_tai_s)
+
+
+def _turning(seen: Offsets) -> Offsets:
+    """What is left of offsets without their mean and drift: much where an axis hunts."""
+    t = seen.tai_s - seen.tai_s[0]
+    right_deg, up_deg = (one - np.polyval(np.polyfit(t, one, 1), t) for one in (seen.right_deg, seen.up_deg))
+    return replace(seen, right_deg=right_deg, up_deg=up_deg)
+
+
+def _noise_seen_deg2(seen: Offsets) -> float:
+    """What offsets show of noise, both components: half the mean square of their differences."""
+    return float(np.mean(np.square(np.diff(seen.right_deg)) + np.square(np.diff(seen.up_deg)))) / 2.0
