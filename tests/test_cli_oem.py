@@ -88,12 +88,27 @@ def test_of_several_satellites_the_name_chooses(tmp_path: Path) -> None:
     assert load(tmp_path, both).label == "ISS (1998-067-A)"
     assert load(tmp_path, both, satellite=from_file("x", "oem", "iss.oem", 25544)).label == "OTHER (25544)"
     assert refusal(tmp_path, both, from_file("MIR", "oem", "iss.oem")) == (
-        "DIR/satellites/iss.oem: no segment with name 'MIR'; the file holds OTHER (25544), ISS (1998-067-A)"
+        "DIR/satellites/iss.oem: no segment with name 'MIR'; the file holds OTHER (25544), ISS (1998-067-A): "
+        "write one's name or designator as the satellite's name"
     )
     twice = kvn(states(600.0), OBJECT_ID="1") + kvn(states())
-    assert "fits ISS (1), ISS (1998-067-A); give each its own file" in refusal(tmp_path, twice)
+    assert "fits ISS (1), ISS (1998-067-A); write one's designator as" in refusal(tmp_path, twice)
+    assert load(tmp_path, twice, satellite=from_file("1998-067A", "oem", "iss.oem")).label == "ISS (1998-067-A)"
     damaged = kvn(states(600.0), OBJECT_NAME="OTHER") + kvn(states()).replace("T20:16:00.000000", "x")
     assert "no segment with name 'ISS'" in refusal(tmp_path, damaged)
+
+
+def test_a_catalogue_number_chooses_only_where_the_file_has_them(tmp_path: Path) -> None:
+    designated, numbered = kvn(states()), kvn(states(), OBJECT_ID="25544")
+    own = from_file("Station", "oem", "iss.oem", 25544)
+    assert load(tmp_path, designated, satellite=own).label == "ISS (1998-067-A)"
+    assert load(tmp_path, numbered, satellite=own).label == "ISS (25544)"
+    other = refusal(tmp_path, numbered, from_file("ISS", "oem", "iss.oem", 48274))
+    assert "no segment with name 'ISS' or with norad_id 48274; the file holds ISS (25544)" in other
+    both = designated + kvn(states(), OBJECT_NAME="OTHER", OBJECT_ID="2020-001A")
+    assert "no segment with name 'Station' or with norad_id 25544; the file holds ISS (1998-067-A), OTHER" in refusal(
+        tmp_path, both, own
+    )
 
 
 def test_the_stations_earth_orientation_reaches_an_earth_fixed_ephemeris(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import real_passes
 from conftest import needs_data
-from made_oems import NO_ORIENTATION, START, States, iss, kvn, source, states
+from made_oems import NO_ORIENTATION, START, States, iss, kvn, source, states, xml
 from real_passes import RealPass, noisy, sky_angles_deg
 from skyfield.api import load
 from skyfield.framelib import ICRS_to_J2000
@@ -20,7 +20,7 @@ from acu_daemon.orbit.kepler import osculating_from_state
 from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.propagator import spans_tai_s
-from acu_daemon.orbit.timescales import tai_from_utc
+from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 from acu_daemon.units import DAY_S, EARTH_RATE_RAD_S, Array
 
 ASKED_M = 1.0  # against held-back states
@@ -95,7 +95,10 @@ def integrated() -> tuple[States, States]:
 
 @pytest.mark.parametrize(
     ("frame", "step_s", "least_m"),
-    [("GCRF", 60, ASKED_M), ("GCRF", 240, ASKED_M), ("ITRF", 60, ASKED_M), ("ITRF", 600, 20.0)],
+    [
+        *((frame, step_s, ASKED_M) for frame in ("GCRF", "ITRF") for step_s in (60, 120, 180, 240)),
+        ("ITRF", 600, 20.0),
+    ],
 )
 def test_an_integrated_orbit_is_met_on_the_ground_between_its_states(
     integrated: tuple[States, States], frame: str, step_s: int, least_m: float
@@ -106,6 +109,52 @@ def test_an_integrated_orbit_is_met_on_the_ground_between_its_states(
     tai_s = itrf[0]
     r_itrs_m, _ = itrs_from_teme(*oem.states_teme(tai_s), tai_s, NO_ORIENTATION)
     assert worst_m(r_itrs_m - itrf[1]) < least_m
+
+
+@pytest.mark.parametrize("step_s", [120, 180])
+def test_what_the_file_recommends_of_interpolation_changes_nothing(
+    integrated: tuple[States, States], step_s: int
+) -> None:
+    gcrf, _ = integrated
+    every = kept(gcrf, step_s // 30)
+    plain = source(kvn(every, REF_FRAME="GCRF")).states_teme(gcrf[0])[0]
+    for method, degree in (("LAGRANGE", "9"), ("HERMITE", "3"), ("LINEAR", "1")):
+        oem = source(kvn(every, REF_FRAME="GCRF", INTERPOLATION=method, INTERPOLATION_DEGREE=degree))
+        assert np.array_equal(oem.states_teme(gcrf[0])[0], plain)
+
+
+def test_states_outside_the_useable_span_still_serve_the_interpolation() -> None:
+    fine = states(step_s=60.0)
+    useable = {
+        key: utc_text(START + at_s, 3).removesuffix("Z")
+        for key, at_s in (("USEABLE_START_TIME", 300.0), ("USEABLE_STOP_TIME", 6900.0))
+    }
+    oem = source(kvn(kept(fine, 3), **useable))
+    inside = slice(5, -5)
+    assert oem.spans_tai_s == ((START + 300.0, START + 6900.0),)
+    assert np.array_equal(
+        oem.states_teme(fine[0][inside])[0], source(kvn(kept(fine, 3))).states_teme(fine[0][inside])[0]
+    )
+    with pytest.raises(OrbitError, match="no position at"):
+        oem.states_teme(fine[0][4:5])
+
+
+@pytest.mark.parametrize(
+    ("created", "epoch_s"), [("2022-02-11T00:00:00", 0.0), ("2022-02-11T21:00:00.000Z", 3600.0), ("x", 0.0)]
+)
+@pytest.mark.parametrize("write", [kvn, xml])
+def test_the_epoch_is_the_creation_of_the_message_within_its_span(write, created: str, epoch_s: float) -> None:
+    text = write(states()).replace("2022-02-11T00:00:00\nORIG", f"{created}\nORIG")
+    text = text.replace("<ORIGINATOR>", f"<CREATION_DATE>{created}</CREATION_DATE><ORIGINATOR>")
+    assert source(text).epoch_tai_s == pytest.approx(START + epoch_s, abs=1e-6)
+
+
+def test_a_creation_in_a_gap_or_after_the_end_is_taken_to_the_last_state_before() -> None:
+    both = kvn(states(600.0), states(600.0, start_tai_s=START + 900.0))
+    for created, epoch_s in (("20:12:00", 600.0), ("23:00:00", 1500.0)):
+        oem = source(both.replace("2022-02-11T00:00:00\n", f"2022-02-11T{created}\n"))
+        assert oem.epoch_tai_s == pytest.approx(START + epoch_s, abs=1e-6)
+        oem.states_teme(np.array([oem.epoch_tai_s]))
 
 
 def test_positions_in_whole_metres_cost_no_more_than_their_rounding() -> None:

@@ -1,5 +1,6 @@
 """Orbit ephemeris messages: KVN and XML give the same, and whatever is wrong is told with file and line."""
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -158,6 +159,9 @@ def test_what_is_no_number_is_refused(write: Writer, word: str) -> None:
 def test_a_line_with_too_few_numbers_and_a_state_without_one_are_told() -> None:
     number = f"{SHORT[1][2, 1] / 1e3:.9f}"
     assert "is not a time with position and velocity" in reason(kvn(SHORT).replace(number, ""))
+    _, r_m, _ = SHORT
+    alone = re.sub(rf"(  {r_m[2, 2] / 1e3:.9f}).*", r"\1", kvn(SHORT))
+    assert "is not a time with position and velocity" in reason(alone)
     assert "a stateVector without Y" in reason(xml(SHORT).replace(f'<Y units="km">{number}</Y>', ""))
     assert "'CENTER_NAME Earth' is not KEY = VALUE" in reason(
         kvn(SHORT).replace("CENTER_NAME          = Earth", "CENTER_NAME Earth")

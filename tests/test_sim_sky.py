@@ -7,17 +7,21 @@ import numpy as np
 import pytest
 from conftest import DATA, needs_data
 from fake_sky import AZIMUTH, ELEVATION, START_TAI_S
+from made_oems import START, iss, kvn, source, states
 from made_orbits import EPOCH_TAI_S, circular, site
 
 from acu_daemon.errors import UsageError
-from acu_daemon.model import Correction, sky_angle_deg
+from acu_daemon.model import Correction, Site, Station, sky_angle_deg
 from acu_daemon.orbit.look import look_at
+from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.sim.build import build_fake_acu, make_sky
 from acu_daemon.sim.scenario import Scenario, SkyErrors
 from acu_daemon.sim.sky import DirectionTable, OrbitSky, read_truth
+from acu_daemon.units import DAY_S
 
 INTERPOLATION_DEG = 1e-4
+SITE = Site(Station("Huntsville", 34.73, -86.58, 190.0))
 HEADER = "utc,az_deg,el_deg,range_km\n"
 
 
@@ -103,6 +107,21 @@ def test_an_orbit_sky_agrees_with_the_look_angles() -> None:
             visible_count += 1
             assert sky_angle_deg(az_deg, el_deg, *direction[:2]) < INTERPOLATION_DEG
     assert visible_count > 20
+
+
+@pytest.mark.parametrize("late_s", [0.0, 7.0, -7.0])
+def test_the_sky_of_an_ephemeris_ends_with_it(late_s: float) -> None:
+    around = find_passes(iss(), SITE, START + 600.0, START + DAY_S, 5.0)[0]
+    begin, end = around.culmination_tai_s - 30.3, around.culmination_tai_s + 30.9
+    oem = source(kvn(states(end - begin, 20.4, begin)))
+    sky = make_sky(oem, SITE, Scenario(sky=SkyErrors(along_track_s=late_s)))
+    for away_s in (-100.0, -1e-3, end - begin + 1e-3, 1000.0):
+        assert sky.direction(begin + late_s + away_s) is None
+    for tai_s in np.linspace(begin + late_s, end + late_s, 500)[1:-1]:
+        seen, wanted = sky.direction(float(tai_s)), look_at(iss(), np.array([tai_s - late_s]), SITE)
+        assert seen is not None
+        if late_s == 0.0:
+            assert sky_angle_deg(*seen[:2], wanted.az_deg[0], wanted.el_deg[0]) < INTERPOLATION_DEG
 
 
 def test_a_satellite_that_runs_late_is_where_the_elements_had_it_before() -> None:

@@ -154,18 +154,38 @@ def select_segments(
     """Choose a satellite's segments of an ephemeris.
 
     A file with one satellite is taken as it is; else, or without is_whole (segments could not be read), the name must
-    fit (case, hyphens and blanks do not count), or the OBJECT_ID be the norad_id.
+    be the OBJECT_NAME or the OBJECT_ID (case, hyphens and blanks do not count), or the OBJECT_ID be the norad_id.
+    An OBJECT_ID that is another catalogue number is never taken.
     Raises:  ElementsError: none of this satellite, or two.
     """
-    found = list(segments)
-    if not is_whole or len({one.label for one in segments}) > 1:
-        found = [one for one in segments if _plain(one.name) == _plain(name) or one.object_id == str(norad_id)]
-    labels = list(dict.fromkeys(one.label for one in found or segments))
+    file, labels = segments[0].file, _labels(segments)
+    found = [one for one in segments if norad_id is None or not one.object_id.isdigit() or _is_number(one, norad_id)]
+    if not is_whole or len(labels) > 1:
+        found = [
+            one
+            for one in found
+            if _plain(name) in (_plain(one.name), _plain(one.object_id)) or _is_number(one, norad_id)
+        ]
     if not found:
-        raise ElementsError(f"{segments[0].file}: no segment with name {name!r}; the file holds {', '.join(labels)}")
-    if len(labels) > 1:
-        raise ElementsError(f"{segments[0].file}: the name {name!r} fits {', '.join(labels)}; give each its own file")
+        also = f" or with norad_id {norad_id}" if norad_id is not None else ""
+        raise ElementsError(
+            f"{file}: no segment with name {name!r}{also}; the file holds {', '.join(labels)}: write one's name or "
+            "designator as the satellite's name"
+        )
+    if len(labels := _labels(found)) > 1:
+        raise ElementsError(
+            f"{file}: the name {name!r} fits {', '.join(labels)}; write one's designator as the satellite's name"
+        )
     return found
+
+
+def _labels(segments: Sequence[OemSegment]) -> list[str]:
+    return list(dict.fromkeys(one.label for one in segments))
+
+
+def _is_number(segment: OemSegment, norad_id: int | None) -> bool:
+    text = segment.object_id
+    return norad_id is not None and text.isascii() and text.isdigit() and int(text) == norad_id
 
 
 def _matching(sets: Sequence[ElementSet], fits: Callable[[ElementSet], bool], wanted: str) -> list[ElementSet]:

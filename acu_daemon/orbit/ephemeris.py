@@ -48,6 +48,7 @@ class Ephemeris:
             self._pieces.append(_Piece(segment.start_tai_s, segment.end_tai_s, table))
         self.mean_motion_rad_s = float(np.mean(np.concatenate(mean_motions)))
         self.spans_tai_s = _merged([(piece.start_tai_s, piece.end_tai_s) for piece in self._pieces])
+        self.epoch_tai_s = _last_determined(self.spans_tai_s, segments[-1].created_tai_s)
 
     @property
     def coverage(self) -> str:
@@ -85,12 +86,13 @@ class Ephemeris:
 class OemPropagator:
     """An ephemeris, corrected as a relative orbit.  Immutable and picklable.
 
-    The correction of the mean anomaly (and that of the mean motion times the seconds since the start) becomes a shift
+    The correction of the mean anomaly (and that of the mean motion times the seconds since the epoch) becomes a shift
     in time along the ephemeris, by its average mean motion: whatever the Earth's flattening does to the orbit, it does
     to the shifted one as well.  A shift that leaves the span goes on by two-body motion (30 m off after a minute).
     The other corrections are added to the osculating elements at each time.  What they change in the secular drifts is
     left out: 0.01 deg of inclination (1.2 km) would move the ISS by 0.3 km a day.  Within a pass it does not show, the
-    fit of node and anomaly takes it up.  `epoch_tai_s` is the start of the first span.
+    fit of node and anomaly takes it up.  `epoch_tai_s` is the message's creation, from which on the states are predicted,
+    or the time of the spans next to it.
     """
 
     kind = "oem"
@@ -98,7 +100,7 @@ class OemPropagator:
     def __init__(self, ephemeris: Ephemeris, correction: Correction | None = None) -> None:
         self.ephemeris = ephemeris
         self.correction = correction or Correction()
-        self.epoch_tai_s = ephemeris.spans_tai_s[0][0]
+        self.epoch_tai_s = ephemeris.epoch_tai_s
 
     @property
     def spans_tai_s(self) -> tuple[tuple[float, float], ...]:
@@ -144,6 +146,14 @@ def _changed(elements: OsculatingElements, correction: Correction, beyond_s: Arr
         argp_rad=argp_rad,
         mean_anomaly_rad=latitude_rad - argp_rad,
     )
+
+
+def _last_determined(spans_tai_s: tuple[tuple[float, float], ...], created_tai_s: float | None) -> float:
+    """The last time within the spans that is not after the creation; the start where all are or nobody knows it."""
+    start_tai_s = spans_tai_s[0][0]
+    if created_tai_s is None:
+        return start_tai_s
+    return max([start_tai_s, *(min(end, created_tai_s) for start, end in spans_tai_s if start <= created_tai_s)])
 
 
 def _merged(spans: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:

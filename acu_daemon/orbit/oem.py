@@ -49,6 +49,7 @@ class OemSegment:
     frame: Frame
     start_tai_s: float  # of the span that may be used
     end_tai_s: float
+    created_tai_s: float | None  # the message's; states after it are predicted
     tai_s: Array = field(repr=False)
     r_m: Array = field(repr=False)
     v_m_s: Array = field(repr=False)
@@ -71,6 +72,7 @@ class _Raw:
     """A segment as text."""
 
     line: int
+    created: str
     fields: dict[str, str] = field(default_factory=dict)
     states: list[tuple[int, str, list[str]]] = field(default_factory=list)  # line, epoch, six numbers
     problem: "_BadSegmentError | None" = None
@@ -110,20 +112,23 @@ def parse_oem(text: str, file: str) -> tuple[list[OemSegment], list[Problem]]:
 def _read_kvn(text: str) -> list[_Raw]:
     found: list[_Raw] = []
     where: Literal["header", "meta", "data", "covariance"] = "header"
+    created = ""
     for number, raw_line in enumerate(text.split("\n"), start=1):
         line = raw_line.strip()
         word = line.split(maxsplit=1)[0] if line else "COMMENT"
         if word == "COMMENT":
             continue
         if word == "META_START":
-            found.append(_Raw(number))
+            found.append(_Raw(number, created))
             where = "meta"
         elif word == "META_STOP":
             where = "data"
         elif word in ("COVARIANCE_START", "COVARIANCE_STOP"):
             where = "covariance" if word == "COVARIANCE_START" else "data"
         elif word.startswith("CCSDS_OEM_VERS"):
-            where = "header"
+            where, created = "header", ""
+        elif where == "header" and word.startswith("CREATION_DATE"):
+            created = line.partition("=")[2].strip()
         elif where == "meta":
             _take_field(found[-1], line, number)
         elif where == "data" and found:
@@ -174,6 +179,7 @@ class _XmlReader:
         self._line = 0
         self._text: list[str] = []
         self._leaves: dict[str, str] = {}
+        self._created = ""
 
     def _refuse(self, *_declaration: object) -> None:
         reason = "a DOCTYPE or ENTITY declaration: an OEM has none, so the file is not read"
@@ -183,7 +189,9 @@ class _XmlReader:
         name = tag.rpartition(":")[2]
         self._text = []
         if name == "segment":
-            self.found.append(_Raw(self.parser.CurrentLineNumber))
+            self.found.append(_Raw(self.parser.CurrentLineNumber, self._created))
+        elif name == "header":
+            self._created = ""
         elif name in ("metadata", "stateVector"):
             self._within, self._leaves, self._line = name, {}, self.parser.CurrentLineNumber
 
@@ -192,6 +200,8 @@ class _XmlReader:
 
     def _end(self, tag: str) -> None:
         name = tag.rpartition(":")[2]
+        if name == "CREATION_DATE":
+            self._created = "".join(self._text).strip()
         if name != self._within:
             self._leaves[name] = "".join(self._text).strip()
             return
@@ -230,6 +240,7 @@ def _segment(raw: _Raw, file: str) -> OemSegment:
         frame=frame,
         start_tai_s=start_tai_s,
         end_tai_s=end_tai_s,
+        created_tai_s=_created_tai_s(raw),
         tai_s=tai_s,
         r_m=states[:, :3].copy(),
         v_m_s=states[:, 3:].copy(),
@@ -276,6 +287,14 @@ def _span_tai_s(raw: _Raw, system: str, tai_s: Array) -> tuple[float, float]:
     if first >= last:
         raise _BadSegmentError("USEABLE_START_TIME to USEABLE_STOP_TIME leaves nothing of the states", raw.line)
     return first, last
+
+
+def _created_tai_s(raw: _Raw) -> float | None:
+    """None where the header has no such date, or no date that can be read."""
+    try:
+        return _tai_s(raw.created, "UTC", raw.line)
+    except _BadSegmentError:
+        return None
 
 
 def _tai_s(text: str, system: str, line: int) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 from acu_daemon.errors import UsageError
 from acu_daemon.model import Correction, Site
 from acu_daemon.orbit.look import look_at
-from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.orbit.propagator import Propagator, spans_tai_s
 from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.units import DEG, Array
 
@@ -113,6 +113,10 @@ class DelayedPropagator:
     def epoch_tai_s(self) -> float:
         return self.source.epoch_tai_s
 
+    @property
+    def spans_tai_s(self) -> tuple[tuple[float, float], ...]:
+        return tuple((start + self.delay_s, end + self.delay_s) for start, end in spans_tai_s(self.source))
+
     def states_teme(self, tai_s: Array) -> tuple[Array, Array]:
         return self.source.states_teme(tai_s - self.delay_s)
 
@@ -129,13 +133,23 @@ class OrbitSky:
         self._block: DirectionTable | None = None
 
     def direction(self, tai_s: float) -> Direction | None:
-        """Interpolate; None below the horizon.  OrbitError: the propagator has no answer."""
+        """Interpolate; None below the horizon or outside the propagator's spans.
+
+        Raises:  OrbitError: the propagator has no answer.
+        """
         block = self._block
         if block is None or not block.start_tai_s <= tai_s <= block.end_tai_s:
-            block = self._block = self._compute(tai_s)
+            span = next((one for one in spans_tai_s(self._propagator) if one[0] <= tai_s <= one[1]), None)
+            if span is None:
+                return None
+            block = self._block = self._compute(tai_s, *span)
         return block.direction(tai_s)
 
-    def _compute(self, tai_s: float) -> DirectionTable:
-        times = tai_s // _BLOCK_S * _BLOCK_S + np.arange(-_BLOCK_STEP_S, _BLOCK_S + 2 * _BLOCK_STEP_S, _BLOCK_STEP_S)
+    def _compute(self, tai_s: float, span_start_tai_s: float, span_end_tai_s: float) -> DirectionTable:
+        start_s = tai_s // _BLOCK_S * _BLOCK_S - _BLOCK_STEP_S
+        start_tai_s = max(start_s, span_start_tai_s)
+        end_tai_s = min(start_s + _BLOCK_S + 2 * _BLOCK_STEP_S, span_end_tai_s)
+        count = max(_NODES, 1 + round((end_tai_s - start_tai_s) / _BLOCK_STEP_S))
+        times = np.linspace(start_tai_s, end_tai_s, count)
         look = look_at(self._propagator, times, self._site)
         return DirectionTable(times, look.az_deg, look.el_deg, look.range_m)
