@@ -7,6 +7,7 @@ import pytest
 from fake_sky import AZIMUTH, ELEVATION, START_TAI_S, Star
 
 from acu_daemon.daemon.port import EXCHANGE_DEADLINE_S, AcuPort
+from acu_daemon.daemon.stopping import stop_antenna
 from acu_daemon.edge.clock import LoopClock
 from acu_daemon.errors import LinkError
 from acu_daemon.protocol.messages import Ack, AcuMode, Nak, Poll, SelectMode, Status, Stow, WriteAndPoll
@@ -197,5 +198,23 @@ def test_waiting_for_a_link_ends_when_it_is_up() -> None:
         assert not port.is_up
         async with asyncio.timeout(1.0):
             await port.wait_until_up()
+
+    play(story)
+
+
+def test_a_safe_stop_outlives_a_link_that_breaks_in_the_middle_of_it() -> None:
+    async def story(port: AcuPort, link: MemoryLink, _clock: LoopClock) -> None:
+        standing = (await port.exchange(Poll())).reply
+        assert isinstance(standing, Status)
+        write, failures = link.write, ["the other side reset the connection"]
+
+        def broken(data: bytes) -> None:
+            if failures:
+                raise LinkError(failures.pop())
+            write(data)
+
+        link.write = broken  # type: ignore[method-assign]
+        assert await stop_antenna(port, standing, clears_watchdog=False)
+        assert port.connect_count == 2
 
     play(story)

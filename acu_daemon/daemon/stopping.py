@@ -34,6 +34,7 @@ async def stop_antenna(port: AcuPort, status: Status, *, clears_watchdog: bool) 
 async def _acknowledged(port: AcuPort, command: Command) -> bool:
     """Send a command until it is acknowledged, a few times."""
     for _ in range(ATTEMPTS):
+        await port.wait_until_up()  # a link that fails meanwhile is reopened, and polled, by its keeper
         if port.must_poll:
             await port.exchange(Poll())
             await port.idle_gap()
