@@ -1,0 +1,130 @@
+"""Elements far worse than their sigmas: the fit finds the satellite all the same, says so, and is honest about it."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from made_orbits import circular, site, visible
+from real_passes import noisy, sky_angles_deg
+
+from acu_daemon.assist.encoder import encoder_look, sigma_deg
+from acu_daemon.assist.estimator import make_estimator
+from acu_daemon.assist.full import FullEstimator
+from acu_daemon.assist.full_states import make_prior
+from acu_daemon.assist.settings import BROUWER_SIGMAS, OEM_SIGMAS, ElementSigmas, EstimatorSettings, StateSigmas
+from acu_daemon.assist.widening import WIDTHS
+from acu_daemon.control.refit import RefitRequest, RefitSetup, Refitter
+from acu_daemon.model import AngleBias, AxisLimits, Correction, FitResult, Readings
+from acu_daemon.orbit.look import look_at
+from acu_daemon.units import DAY_S
+
+SIGMA_DEG = 0.03
+GIVEN = EstimatorSettings(SIGMA_DEG, SIGMA_DEG, orbit_sigmas=StateSigmas(3e3, 3.0))
+SOURCE, WHERE = circular(66.0, 0.001), site(4.0)
+TRUTH = {km: SOURCE.corrected(Correction(delta_mean_anomaly_rad=-km / 7180.0)) for km in (0.0, 3.0, 49.0, -49.0, 200.0)}
+
+
+def readings_of(km: float, seed: int = 1, bias: AngleBias | None = None) -> Readings:
+    bias = bias or AngleBias()
+    tai_s = visible(TRUTH[km], WHERE, 1.0)
+    seen = look_at(TRUTH[km], tai_s, WHERE)
+    return noisy(seen.az_deg + bias.az_deg, seen.el_deg + bias.el_deg, tai_s, SIGMA_DEG, np.random.default_rng(seed))
+
+
+def first(readings: Readings, count: int) -> Readings:
+    return readings.part(slice(0, count))
+
+
+def off_and_sigma_deg(fit: FitResult | None, km: float, tai_s: Any) -> tuple[Any, Any]:
+    assert fit is not None
+    corrected = SOURCE.corrected(fit.correction)
+    seen, real = encoder_look(corrected, tai_s, WHERE, fit), look_at(TRUTH[km], tai_s, WHERE)
+    sigma = sigma_deg(corrected, tai_s, WHERE, fit)
+    assert sigma is not None
+    return sky_angles_deg(seen.az_deg, seen.el_deg, real.az_deg, real.el_deg), sigma
+
+
+@pytest.mark.parametrize("km", [49.0, -49.0, 200.0])
+@pytest.mark.parametrize("count", [60, 300])
+def test_elements_sixteen_sigmas_off_are_recovered_with_a_note(km: float, count: int) -> None:
+    readings = readings_of(km)
+    estimator = make_estimator("full", SOURCE, WHERE, GIVEN)
+    for k in range(0, count, 20):
+        estimator.add(readings.part(slice(k, k + 20)))
+        fit = estimator.fit()
+    off, sigma = off_and_sigma_deg(fit, km, readings.tai_s)
+    assert (off < 4.0 * sigma + 0.01).all()
+    assert off.max() < (1.0 if count == 60 else 0.1)
+    assert estimator.notes[0].startswith("the satellite is farther from its elements than their sigmas allow")
+    assert len(estimator.notes) < len(WIDTHS)
+    narrow = FullEstimator(SOURCE, WHERE, GIVEN)
+    narrow.add(first(readings, count))
+    off, sigma = off_and_sigma_deg(narrow.fit(), km, readings.tai_s)
+    assert (off > 4.0 * sigma).any()
+
+
+@pytest.mark.parametrize("bias", [AngleBias(), AngleBias(az_deg=0.15, el_deg=-0.12)])
+@pytest.mark.parametrize("km", [0.0, 3.0])
+def test_elements_within_their_sigmas_are_left_as_narrow_as_they_are(km: float, bias: AngleBias) -> None:
+    for seed in range(4):
+        readings = readings_of(km, seed, bias)
+        estimators = [make_estimator("full", SOURCE, WHERE, GIVEN), FullEstimator(SOURCE, WHERE, GIVEN)]
+        for one in estimators:
+            one.add(first(readings, 200))
+        wide, narrow = (one.fit() for one in estimators)
+        assert wide is not None
+        assert narrow is not None
+        assert wide.correction == narrow.correction
+        assert estimators[0].notes == []
+
+
+def test_readings_noisier_than_configured_widen_nothing() -> None:
+    noise = np.random.default_rng(5).normal(size=(2, 200)) * 5.0 * SIGMA_DEG
+    few = first(readings_of(0.0), 200)
+    estimator = make_estimator("full", SOURCE, WHERE, GIVEN)
+    estimator.add(Readings(few.tai_s, few.az_deg + noise[0], few.el_deg + noise[1]))
+    estimator.fit()
+    assert estimator.notes == []
+
+
+def test_the_daemons_refit_finds_such_a_satellite_through_its_gate() -> None:
+    readings = readings_of(49.0)
+    setup = RefitSetup(SOURCE, WHERE, "full", GIVEN, AxisLimits(-270.0, 270.0, 20.0, 10.0))
+    refitter = Refitter(setup)
+    notes: list[str] = []
+    for k in range(0, 120, 5):
+        now_tai_s = float(readings.tai_s[k + 4])
+        part = readings.part(slice(k, k + 5))
+        reply = refitter.refit(RefitRequest(part, now_tai_s, 90.0, now_tai_s, 0.0))
+        notes += reply.notes
+    off, sigma = off_and_sigma_deg(reply.fit, 49.0, readings.tai_s[120:])
+    assert (off < 4.0 * sigma).all()
+    assert off.max() < 0.5
+    assert any("farther from its elements" in note for note in notes)
+
+
+# What is known before the first reading
+
+
+def test_each_kind_of_elements_has_sigmas_of_its_own_unless_the_satellites_file_says_them() -> None:
+    plain = EstimatorSettings()
+    assert [plain.sigmas_of(kind) for kind in ("tle", "omm", "oem", "brouwer")] == [
+        ElementSigmas(),
+        ElementSigmas(),
+        OEM_SIGMAS,
+        BROUWER_SIGMAS,
+    ]
+    assert GIVEN.sigmas_of("brouwer") == GIVEN.sigmas_of("oem") == StateSigmas(3e3, 3.0)
+
+
+def test_mean_motion_and_e_vector_of_brouwer_elements_are_worth_less_by_the_day() -> None:
+    """Against an integrated orbit without drag: 0.4 km a day, radially, are 6e-5 in the e-vector."""
+    sigmas = [
+        np.sqrt(np.diag(make_prior(SOURCE, EstimatorSettings(), SOURCE.epoch_tai_s + days * DAY_S).covariance))
+        for days in (0.0, 5.0, 10.0)
+    ]
+    assert sigmas[0][3] == pytest.approx(2e-4)
+    assert sigmas[1][3] == pytest.approx(np.hypot(2e-4, 3e-4))
+    assert sigmas[2][4] == pytest.approx(np.hypot(2e-4, 6e-4))
+    assert sigmas[2][2] == pytest.approx(4e-5 / 60.0, rel=0.02)
+    assert sigmas[2][0] == sigmas[0][0]
