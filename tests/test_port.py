@@ -206,11 +206,11 @@ def test_a_safe_stop_outlives_a_link_that_breaks_in_the_middle_of_it() -> None:
     async def story(port: AcuPort, link: MemoryLink, _clock: LoopClock) -> None:
         standing = (await port.exchange(Poll())).reply
         assert isinstance(standing, Status)
-        write, failures = link.write, ["the other side reset the connection"]
+        write = link.write
 
         def broken(data: bytes) -> None:
-            if failures:
-                raise LinkError(failures.pop())
+            if port.connect_count == 1 and port.attempt_count == 1:
+                raise LinkError("the other side reset the connection")
             write(data)
 
         link.write = broken  # type: ignore[method-assign]
