@@ -16,8 +16,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from figures_carry_over import load, source_of
 from real_pass import truth_path
+from tables.skies import real_elements, real_sky
 
 from acu_daemon.assist.encoder import encoder_look
 from acu_daemon.assist.full import FullEstimator
@@ -111,7 +111,7 @@ class Place:
 
     @classmethod
     def of(cls, name: str) -> "Place":
-        return cls(source_of(name, 0.0), load(name).site, read_truth(truth_path(name)))
+        return cls(real_elements(name), real_sky(name).site, read_truth(truth_path(name)))
 
     def truth(self, tai_s: Array) -> tuple[Array, Array]:
         seen = [self.sky.direction(float(t)) or (np.nan, np.nan, np.nan) for t in tai_s]

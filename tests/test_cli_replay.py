@@ -83,7 +83,7 @@ def test_a_real_pass_is_predicted_through_its_loss_in_the_format_of_the_design(
     out = tmp_path / "out.csv"
     done = replay(config, readings, out, *(["--estimator", estimator] if estimator else []))
     assert (done.code, done.out) == (0, "")
-    assert done.err == ""
+    assert done.err == "readings left out of the fit: 1 not acquired for the dwell time yet\n"
     text = out.read_bytes()
     assert text.startswith(b"utc,az_deg,el_deg,sigma_deg,source\n")
     assert text.endswith(b"\n")
@@ -119,6 +119,9 @@ def test_all_estimators_are_compared_in_files_beside_the_named_one_a_table_and_a
     assert made == {"out.png", *(f"out-{name}.csv" for name in ESTIMATORS)}
     assert (tmp_path / "out.png").read_bytes().startswith(b"\x89PNG")
     what, _, header, *table = done.out.splitlines()
+    counts = [row.split(maxsplit=1) for row in table[len(ESTIMATORS) + 2 :]]
+    assert counts == [[name, "1 not acquired for the dwell time yet"] for name in ESTIMATORS]
+    table = table[: len(ESTIMATORS)]
     assert what.startswith(f"Prediction against {sum(line.endswith(',0') for line in lines)} readings without lock")
     assert header.split()[:4] == ["estimator", "median", "deg", "95"]
     assert [row.split()[0] for row in table] == list(ESTIMATORS)

@@ -22,7 +22,13 @@ def lines(flags: str) -> list[tuple[float, Reading | None]]:
 def predicted(count: int, first_fit: int, off_deg: float) -> list[Replayed]:
     """Predictions that are wrong by off_deg in elevation, fitted from a line on."""
     return [
-        Replayed(100.0, 30.0 + off_deg, None, TrackState.HOLD_FITTED, FIT if k >= first_fit else None)
+        Replayed(
+            100.0,
+            30.0 + off_deg,
+            None,
+            TrackState.HOLD_FITTED,
+            *((FIT, {"side lobe": 1, "off the predicted path": 3}) if k >= first_fit else ()),
+        )
         for k in range(count)
     ]
 
@@ -67,6 +73,8 @@ def test_the_table_says_what_was_compared_and_how_far_off_the_last_fit_was() -> 
     assert said[0].startswith("Prediction against 2 readings without lock")
     assert said[3].split() == ["one", *["0.1000"] * 3, "1.250", "s", "early,", "+0.0100", "deg", "across", "1.23"]
     assert said[4].split()[-2:] == ["none", "0.10"]
+    assert said[5:7] == ["", "readings left out of the fits"]
+    assert said[7:] == ["one             3 off the predicted path, 1 side lobe", "none            none"]
 
 
 def test_without_anything_to_compare_the_table_has_dashes() -> None:

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from made_orbits import circular, site, visible
 
+from acu_daemon.assist.carry_over import CarryOver, carry_over_of
+from acu_daemon.assist.gate import BELIED, WRONG_TARGET
 from acu_daemon.assist.model_choice import Model, ModelChoice, choose, newest_residual_deg
 from acu_daemon.assist.settings import EstimatorSettings
-from acu_daemon.control.refit import RefitRequest, RefitSetup, Refitter
+from acu_daemon.control.refit import CARRIED_S, DROPPED, RefitReply, RefitRequest, RefitSetup, Refitter
 from acu_daemon.model import AxisLimits, Correction, FitResult, Readings
 from acu_daemon.orbit.look import look_at
 
@@ -68,3 +70,67 @@ def test_a_fit_that_goes_astray_is_left_for_the_elements_and_comes_back_from_the
     kalman.fit = astray  # type: ignore[method-assign]
     assert [refit(k) for k in range(40, 44)] == [Model.ELEMENTS, Model.ELEMENTS, Model.NEW_FIT, Model.NEW_FIT]
     assert refitter._estimator is not kalman
+
+
+# What an earlier pass left, the gate, and fresh starts together
+
+
+SOURCE, WHERE, SETTINGS = circular(), site(6.0), EstimatorSettings(NOISE_DEG, NOISE_DEG)
+LATE = Correction(delta_mean_anomaly_rad=np.radians(-0.3))
+
+
+def _path(correction: Correction, count: int, up_deg_s: float = 0.0) -> Readings:
+    tai_s = visible(SOURCE.corrected(correction), WHERE, 1.0)[60 : 60 + count]
+    seen = look_at(SOURCE.corrected(correction), tai_s, WHERE)
+    noise_deg = NOISE_DEG * np.random.default_rng(1).standard_normal((2, count))
+    el_deg = seen.el_deg + up_deg_s * np.arange(count) + noise_deg[0]
+    return Readings(tai_s, (seen.az_deg + noise_deg[1] / np.cos(np.radians(el_deg))) % 360.0, el_deg)
+
+
+def _left(correction: Correction) -> CarryOver:
+    """What a pass an hour before left, of an orbit that was fitted from good readings."""
+    refitter = Refitter(RefitSetup(SOURCE, WHERE, "full", SETTINGS, AZIMUTH))
+    readings = _path(correction, 200)
+    fit = refitter.refit(RefitRequest(readings, readings.tai_s[-1], 2.0, readings.tai_s[-1], 180.0)).fit
+    assert fit is not None
+    carried = carry_over_of(fit, SOURCE, WHERE)
+    assert carried is not None
+    return replace(carried, at_tai_s=carried.at_tai_s - 3600.0)
+
+
+def _replies(refitter: Refitter, readings: Readings) -> list[RefitReply]:
+    parts = (readings.part(slice(k, k + 1)) for k in range(len(readings)))
+    return [refitter.refit(RefitRequest(one, one.tai_s[0], 2.0, one.tai_s[0], 180.0)) for one in parts]
+
+
+def test_another_satellite_does_not_shake_what_the_last_pass_left() -> None:
+    refitter = Refitter(RefitSetup(SOURCE, WHERE, "full", SETTINGS, AZIMUTH, carried=_left(LATE)))
+    good = _path(LATE, 120)
+    wrong = _path(LATE, 120, up_deg_s=0.25)
+    replies = _replies(refitter, wrong.part(slice(0, 60)))
+    assert {reply.model for reply in replies[15:]} == {Model.LAST_PASS}
+    assert replies[-1].gate.counts[WRONG_TARGET] == 60
+    assert not any(reply.notes for reply in replies)
+    assert _replies(refitter, good.part(slice(60, 120)))[-1].model is Model.NEW_FIT
+
+
+def test_a_carried_orbit_that_is_denied_is_gone_for_good_even_where_the_fit_starts_afresh_later() -> None:
+    refitter = Refitter(RefitSetup(SOURCE, WHERE, "full", SETTINGS, AZIMUTH, carried=_left(LATE)))
+    moved = Correction(delta_mean_anomaly_rad=np.radians(0.3))
+    replies = _replies(refitter, _path(moved, 60))
+    notes = [note for reply in replies for note in reply.notes]
+    assert notes == [DROPPED]
+    assert [reply.model for reply in replies].index(Model.NEW_FIT) == CARRIED_S
+    assert {reply.model for reply in replies[int(CARRIED_S) :]} == {Model.NEW_FIT}
+    refitter._gate.restart(30.0)
+    refitter._begin_fit()
+    now_tai_s = replies[-1].prediction.start_tai_s
+    later = refitter.refit(RefitRequest(Readings.of([]), now_tai_s, 2.0, now_tai_s, 180.0))
+    assert (later.model, later.notes) == (Model.NEW_FIT, ())
+    assert later.gate.counts[BELIED] == 29
+
+
+def test_what_the_last_pass_left_is_no_model_for_an_estimator_without_a_covariance() -> None:
+    refitter = Refitter(RefitSetup(SOURCE, WHERE, "kalman", SETTINGS, AZIMUTH, carried=_left(LATE)))
+    now_tai_s = float(_path(LATE, 1).tai_s[0])
+    assert refitter.refit(RefitRequest(Readings.of([]), now_tai_s, 2.0, now_tai_s, 180.0)).model is Model.ELEMENTS

@@ -12,7 +12,7 @@ import typer
 from acu_daemon.assist.estimator import ESTIMATORS
 from acu_daemon.cli.options import Config, Satellite, Target, load_target
 from acu_daemon.config import estimator_settings
-from acu_daemon.control.comparison import compare
+from acu_daemon.control.comparison import compare, what_is_left_out
 from acu_daemon.control.refit import RefitSetup
 from acu_daemon.control.replay import Replayed, replay
 from acu_daemon.edge.recording import read_readings
@@ -78,6 +78,9 @@ def command(
         seconds[name] = time.perf_counter() - started_s
     if estimator == ALL:
         _compare(job, results, seconds, out.with_suffix(".png"))
+        return
+    (only,) = results.values()
+    typer.echo(f"readings left out of the fit: {what_is_left_out(only[-1].left_out)}", err=True)
 
 
 def _beside(out: Path, name: str | None) -> Path:

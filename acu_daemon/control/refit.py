@@ -13,6 +13,7 @@ from acu_daemon.assist.full import FullEstimator, shift_for_people
 from acu_daemon.assist.gate import OUTLIER
 from acu_daemon.assist.model_choice import Model, ModelChoice, choose, newest_residual_deg
 from acu_daemon.assist.prediction import predict
+from acu_daemon.assist.spans import span_s
 from acu_daemon.assist.track_gate import TrackGate
 from acu_daemon.model import AxisLimits, FitResult, Prediction, PredictionKind, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
@@ -21,6 +22,8 @@ from acu_daemon.pointing.keyhole import follow_path, longest_window_s
 BATCH_S = 1.0  # readings are judged by the fit to those before them: so many at a time
 BATCH_SHARE = 0.1  # or this share of what was taken already, such as when a new child is given a whole pass
 RESTART_S = 30.0  # a fit that is bad again and again starts afresh with the newest readings
+CARRIED_S = 10.0  # so long its readings must deny what it began with
+DROPPED = "the last pass's orbit is dropped: the fits that began with it stayed far from the newest readings"
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,9 +101,9 @@ class Refitter:
         notes = self._take_notes()
         models = self._models(request.now_tai_s)
         self._choose(models, has_news=len(request.readings) > 0)
-        if self._choice.is_reset_due:
+        if self._choice.is_reset_due and (self._carried is None or span_s(self._gate.kept) >= CARRIED_S):
+            notes += self._drop_carried()
             self._gate.restart(RESTART_S)
-            self._forget_resumed()
             self._begin_fit()
             models = self._models(request.now_tai_s)
             self._choose(models, has_news=True)
@@ -124,6 +127,12 @@ class Refitter:
         elif len(taken.new):
             for estimator in self._estimators:
                 estimator.add(taken.new)
+
+    def _drop_carried(self) -> tuple[str, ...]:
+        """A fresh start that began with the same orbit would end as badly."""
+        is_last_pass = self._carried is not None and self._resumed is None
+        self._carried = self._resumed = None
+        return (DROPPED,) if is_last_pass else ()
 
     def _forget_resumed(self) -> None:
         """What this pass's newer readings deny is not gone on from."""

@@ -6,7 +6,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from acu_daemon.control.comparison import Comparison
+from acu_daemon.control.comparison import Comparison, what_is_left_out
 from acu_daemon.model import FitResult
 from acu_daemon.units import Array
 
@@ -29,6 +29,8 @@ def table(seen: Comparison, seconds: dict[str, float]) -> list[str]:
             else [f"{'-':>12}"] * 3
         )
         lines.append(f"{name:14}{''.join(figures)}   {_shift(seen.last_fit[name]):32}{seconds[name]:9.2f}")
+    lines += ["", "readings left out of the fits"]
+    lines += [f"{name:14}  {what_is_left_out(counts)}" for name, counts in seen.left_out.items()]
     return lines
 
 
