@@ -112,7 +112,9 @@ def _walk(
     state = replace(state, track=track, entered_tai_s=now_tai_s)
     if track is TrackState.LINK_LOST:
         watchdog = Watchdog.UNKNOWN if state.watchdog is Watchdog.SET else state.watchdog
-        state = replace(state, stage=Stage.NEW, last_extra=None, axis_az=None, axis_el=None, commands=())
+        state = replace(
+            state, stage=Stage.NEW, last_extra=None, axis_az=None, axis_el=None, last_write_tai_s=None, commands=()
+        )
         state = replace(state, watchdog=watchdog, axes=AxesWatch())
     if track in HOLDING:
         state = replace(state, hold_from_tai_s=now_tai_s)
