@@ -12,6 +12,7 @@ EVERY_TICKS = 2
 
 def live_text(seen: Snapshot, beam_error_deg: float | None = None) -> str:
     """One line for people; what is not known is shown as a dash.  A simulation also knows the beam error."""
+    hands = "" if seen.arming == "armed" else seen.arming.upper()
     mark = " ".join(
         word for word, is_on in (("SIMULATION", seen.is_simulation), ("REHEARSAL", seen.is_rehearsal)) if is_on
     )
@@ -30,12 +31,16 @@ def live_text(seen: Snapshot, beam_error_deg: float | None = None) -> str:
         correction = "no fit yet"
     parts = [
         f"{utc_text(seen.tai_s, 1)[11:]} {mark}".rstrip(),
+        hands,
+        f"latched: {seen.latch}" if seen.latch else "",
         f"{seen.state:16} {antenna}",
         miss,
         correction,
         _inside(seen),
         f"buffer {seen.buffer_s:3.0f} s {seen.buffer_kind}",
         f"rejecting: {seen.rejecting}" if seen.rejecting else "",
+        seen.encoder_problem,
+        seen.clock_alarm,
     ]
     return "  ".join(part for part in parts if part).rstrip()
 

@@ -1,0 +1,104 @@
+"""The control channel of a running daemon: who may ask, what is answered, and what is said when nobody is there."""
+
+import asyncio
+import os
+import socket
+import stat
+from pathlib import Path
+
+import pytest
+from command_line import acu_daemon
+
+from acu_daemon.edge.control_socket import LONGEST_LINE, SOCKET, ControlSocket, ask
+from acu_daemon.errors import AcuDaemonError, UsageError
+
+
+def answer(line: str) -> str:
+    return {"status": 'ok {"state": "IDLE"}', "arm": "error this daemon runs with --shadow"}.get(line, f"ok {line}")
+
+
+async def asked(directory: Path, line: str) -> str:
+    return await asyncio.to_thread(ask, directory, line)
+
+
+async def test_a_line_is_answered_by_a_line(tmp_path: Path) -> None:
+    channel = ControlSocket(tmp_path, answer)
+    await channel.open()
+    assert await asked(tmp_path, "status") == '{"state": "IDLE"}'
+    with pytest.raises(AcuDaemonError, match="runs with --shadow"):
+        await asked(tmp_path, "arm")
+    await channel.close()
+    assert not (tmp_path / SOCKET).exists()
+
+
+async def test_the_socket_is_for_its_owner_and_group_whatever_the_umask(tmp_path: Path) -> None:
+    before = os.umask(0)
+    try:
+        channel = ControlSocket(tmp_path, answer)
+        await channel.open()
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / SOCKET).stat().st_mode) == 0o660
+    await channel.close()
+
+
+async def test_what_a_killed_daemon_left_is_replaced(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as dead:
+        dead.bind(str(tmp_path / SOCKET))
+    with pytest.raises(AcuDaemonError, match="no daemon runs"):
+        ask(tmp_path, "status")
+    channel = ControlSocket(tmp_path, answer)
+    await channel.open()
+    assert await asked(tmp_path, "disarm") == "disarm"
+    await channel.close()
+
+
+async def test_two_daemons_do_not_share_a_state_directory(tmp_path: Path) -> None:
+    channel = ControlSocket(tmp_path, answer)
+    await channel.open()
+    with pytest.raises(UsageError, match="another daemon runs with this state directory"):
+        await ControlSocket(tmp_path, answer).open()
+    assert await asked(tmp_path, "clear") == "clear"
+    await channel.close()
+
+
+async def test_a_path_too_long_for_an_address_works_too(tmp_path: Path) -> None:
+    deep = tmp_path / ("d" * 60) / ("e" * 60)
+    deep.mkdir(parents=True)
+    channel = ControlSocket(deep, answer)
+    await channel.open()
+    assert await asked(deep, "clear") == "clear"
+    await channel.close()
+
+
+async def test_a_client_that_talks_without_end_or_not_at_all_disturbs_nobody(tmp_path: Path) -> None:
+    channel = ControlSocket(tmp_path, answer)
+    await channel.open()
+    _, silent = await asyncio.open_unix_connection(str(tmp_path / SOCKET))
+    reader, endless = await asyncio.open_unix_connection(str(tmp_path / SOCKET))
+    endless.write(b"x" * (4 * LONGEST_LINE))
+    assert await reader.readline() == b"error the line is too long\n"
+    assert await asked(tmp_path, "disarm") == "disarm"
+    for writer in (silent, endless):
+        writer.close()
+        await writer.wait_closed()
+    await asyncio.sleep(0.01)
+    await channel.close()
+
+
+@pytest.mark.parametrize("word", ["arm", "disarm", "clear", "status"])
+def test_without_a_daemon_every_word_says_what_to_do(word: str, tmp_path: Path) -> None:
+    done = acu_daemon(word, "--state", tmp_path / "nowhere")
+    assert done.code == 1
+    assert "no daemon runs with this state directory" in done.err
+    assert "--rehearsal" in done.err
+    assert not (tmp_path / "nowhere").exists()
+
+
+def test_no_permission_says_whose_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(socket.socket, "connect", refuse)
+    with pytest.raises(AcuDaemonError, match="not permitted; be the daemon's user or in the group"):
+        ask(tmp_path, "arm")

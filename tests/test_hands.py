@@ -1,0 +1,300 @@
+"""P1, P5, P6: arming, the latch, a STOP by another hand, and the fence, in the pure decision of a tick."""
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from test_tick import CONFIG, FITTED, NOW, SKY, ready, saw, status
+
+from acu_daemon.control.fence import READS, refusal
+from acu_daemon.control.state import ControlState, Exchange, Observation, Orders, Request, Stage, Watchdog
+from acu_daemon.control.states import ACTIVE, TrackState
+from acu_daemon.control.tick import tick
+from acu_daemon.protocol.messages import (
+    Ack,
+    AcuMode,
+    Backup,
+    ClearChange,
+    Command,
+    Nak,
+    Parameter,
+    Poll,
+    ReadParameter,
+    ResetFault,
+    SelectBackup,
+    SelectMode,
+    Status,
+    Stop,
+    Stow,
+    WriteAndPoll,
+    WriteParameter,
+    WriteRegisters,
+)
+
+GUARDED = replace(CONFIG, register_watchdog_s=5.0)
+LATCH = "elevation stands still away from its command"
+
+
+def moving(track: TrackState = TrackState.HOLD_FITTED, mode: AcuMode = AcuMode.REMOTE_BACKUP) -> ControlState:
+    """A daemon whose writes the antenna follows."""
+    before = status(mode)
+    state = ready(track, before)
+    return replace(state, reading=saw(before).reading, in_force=(NOW - 0.1, 100.0, 40.0), watchdog=Watchdog.SET)
+
+
+def run(
+    state: ControlState, seen: Status, count: int = 1, config=GUARDED, **first
+) -> tuple[ControlState, list[Command]]:
+    """Ticks against an ACU that acknowledges STOP; returns all that was sent."""
+    sent: list[Command] = []
+    extra = None
+    for k in range(count):
+        observed = saw(seen, extra=extra, **(first if k == 0 else {}))
+        observed = replace(observed, reading=replace(observed.reading, tai_s=NOW + 0.1 * k))
+        state, orders = tick(state, observed, FITTED, NOW + 0.1 * (k + 1), config)
+        sent += [command for command in (orders.first, orders.extra) if command is not None]
+        extra = Exchange(orders.extra, Ack()) if orders.extra is not None else None
+    return state, sent
+
+
+def orders_of(sent: list[Command]) -> list[Command]:
+    return [command for command in sent if not isinstance(command, READS)]
+
+
+# Arming
+
+
+@pytest.mark.parametrize("track", sorted(ACTIVE))
+def test_p1_disarmed_in_mid_pass_it_stops_then_clears_the_watchdog_then_keeps_its_hands_off(track: TrackState) -> None:
+    state, sent = run(moving(track), status(AcuMode.REMOTE_BACKUP), 30, requests=(Request.DISARM,))
+    assert orders_of(sent) == [Stop(), WriteParameter("W", 0)]
+    assert not state.is_armed(GUARDED)
+    assert state.disarmed_by == "a person"
+
+
+def test_p1_a_stop_that_is_not_acknowledged_is_repeated_and_nothing_else_is_sent() -> None:
+    state, sent = moving(), []
+    for k in range(20):
+        observed = saw(status(AcuMode.REMOTE_BACKUP), requests=(Request.DISARM,) if k == 0 else ())
+        state, orders = tick(state, observed, FITTED, NOW + 0.1 * k, GUARDED)
+        sent += orders_of([orders.first, *([orders.extra] if orders.extra else [])])
+    assert set(sent) == {Stop()}
+    assert len(sent) >= 5
+
+
+def test_p1_armed_again_it_begins_with_the_present_angles() -> None:
+    state, _ = run(moving(), status(AcuMode.REMOTE_BACKUP), 10, requests=(Request.DISARM,))
+    state, orders = tick(state, saw(status(AcuMode.STANDBY), requests=(Request.ARM,)), FITTED, NOW + 5.0, GUARDED)
+    assert state.is_armed(GUARDED)
+    assert state.stage is Stage.REGISTERS_KNOWN
+    assert (orders.first, orders.extra) == (Poll(), ReadParameter("S"))
+
+
+def test_p1_a_shadow_is_never_armed() -> None:
+    shadow = replace(GUARDED, is_shadow=True)
+    state = replace(moving(), stage=Stage.REGISTERS_KNOWN)
+    state, sent = run(state, status(), 20, shadow, requests=(Request.ARM,))
+    assert not state.is_armed(shadow)
+    assert orders_of(sent) == []
+
+
+def test_a_daemon_that_never_moved_anything_sends_no_stop_when_it_is_disarmed() -> None:
+    state = replace(ready(TrackState.IDLE, status(AcuMode.STANDBY)), stage=Stage.REGISTERS_KNOWN)
+    _, sent = run(state, status(AcuMode.STANDBY), 10, requests=(Request.DISARM,))
+    assert orders_of(sent) == []
+
+
+def test_disarmed_while_the_local_panel_has_control_no_stop_is_owed_later() -> None:
+    panel = status(AcuMode.MANUAL, is_remote_enabled=False)
+    state, sent = run(moving(), panel, 10, requests=(Request.DISARM,))
+    assert orders_of(sent) == []
+    _, sent = run(state, status(AcuMode.AUTOTRACK), 10)
+    assert orders_of(sent) == [WriteParameter("W", 0)]
+
+
+# The latch
+
+
+def latched(**changes: object) -> ControlState:
+    return replace(moving(), latch=LATCH, is_stop_due=True, **changes)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("mode", [AcuMode.REMOTE, AcuMode.REMOTE_BACKUP, AcuMode.AUTOTRACK, AcuMode.STANDBY])
+def test_p6_latched_it_sends_stop_until_it_is_acknowledged_and_no_more(mode: AcuMode) -> None:
+    state, sent = run(latched(), status(mode), 30)
+    assert orders_of(sent) == [Stop()]
+    assert state.track is TrackState.FAULT
+
+
+def test_p6_the_latch_outlives_a_lost_link_and_whatever_the_acu_does() -> None:
+    state, _ = run(latched(), status(AcuMode.STANDBY), 5)
+    state, _ = tick(state, Observation(silence_s=3.0), FITTED, NOW + 9.0, GUARDED)
+    assert state.track is TrackState.LINK_LOST
+    for mode in AcuMode:
+        state, sent = run(state, status(mode), 12)
+        assert orders_of(sent) == []
+        assert state.latch == LATCH
+    assert state.track is TrackState.FAULT
+
+
+def test_p6_only_a_person_clears_it_and_the_start_order_begins_anew() -> None:
+    state, _ = run(latched(), status(AcuMode.STANDBY), 5)
+    state, _ = run(state, status(AcuMode.STANDBY), 3, requests=(Request.ARM, Request.DISARM, Request.ARM))
+    assert state.latch == LATCH
+    state, orders = tick(state, saw(status(AcuMode.STANDBY), requests=(Request.CLEAR,)), FITTED, NOW + 9.0, GUARDED)
+    assert state.latch == ""
+    assert state.stage < Stage.READY
+    assert not isinstance(orders.first, WriteAndPoll)
+
+
+# Another hand
+
+
+@pytest.mark.parametrize("mode", [AcuMode.REMOTE, AcuMode.ACQUIRE, AcuMode.AUTOTRACK, AcuMode.REMOTE_BACKUP])
+def test_a_stop_by_another_hand_is_respected_until_a_person_arms(mode: AcuMode) -> None:
+    state, sent = run(moving(mode=mode), status(AcuMode.STANDBY), 50)
+    assert orders_of(sent) == [WriteParameter("W", 0)]
+    assert state.disarmed_by == "another hand that stopped the antenna"
+    assert state.track is TrackState.IDLE
+    state, sent = run(state, status(AcuMode.STANDBY), 2, requests=(Request.ARM,))
+    assert state.is_armed(GUARDED)
+
+
+@pytest.mark.parametrize(
+    "seen",
+    [
+        status(AcuMode.STANDBY, backup_selected=Backup.RATE),
+        status(AcuMode.STANDBY, has_interlock_fault=True),
+    ],
+    ids=["power cycle", "fault or register watchdog"],
+)
+def test_standby_by_the_acus_own_doing_is_no_stop(seen: Status) -> None:
+    state, _ = run(moving(), seen)
+    assert state.is_armed(GUARDED)
+
+
+def test_standby_after_registers_went_unwritten_is_no_stop() -> None:
+    state = replace(moving(), in_force=(NOW - 5.0, 100.0, 40.0))
+    assert run(state, status(AcuMode.STANDBY))[0].is_armed(GUARDED)
+
+
+def test_an_acu_found_autotracking_far_from_the_path_is_not_believed() -> None:
+    other = replace(status(), az_deg=200.0, el_deg=15.0)
+    state = replace(ready(TrackState.IDLE, other), az_deg=-160.0)
+    assert tick(state, saw(other), FITTED, NOW, CONFIG)[0].track is TrackState.PREPOSITION
+    assert tick(ready(TrackState.IDLE, status()), saw(status()), FITTED, NOW, CONFIG)[0].track is (
+        TrackState.AUTOTRACK_FITTED
+    )
+
+
+# The fence
+
+
+DANGEROUS: tuple[Command, ...] = (
+    WriteAndPoll(100.0, 40.0),
+    WriteRegisters(100.0, 40.0),
+    SelectMode(AcuMode.AUTOTRACK),
+    SelectMode(AcuMode.STANDBY),
+    SelectBackup(Backup.REMOTE),
+    WriteParameter("W", 250),
+    WriteParameter("S", 0),
+    Stow(),
+    ResetFault(),
+    ClearChange(),
+)
+
+
+@pytest.mark.parametrize("command", DANGEROUS, ids=str)
+@pytest.mark.parametrize(
+    ("change", "config"),
+    [
+        ({"arming": False}, CONFIG),
+        ({"latch": LATCH}, CONFIG),
+        ({"stage": Stage.NEW}, CONFIG),
+        ({"status": status(AcuMode.MANUAL, is_remote_enabled=False)}, CONFIG),
+        ({"status": None}, CONFIG),
+        ({}, replace(CONFIG, is_shadow=True)),
+    ],
+    ids=["disarmed", "latched", "not started", "local panel", "no status", "shadow"],
+)
+def test_p5_no_order_passes_the_fence_where_it_has_no_business(command, change, config) -> None:
+    assert refusal(command, replace(moving(), **change), config)
+
+
+@pytest.mark.parametrize("command", [Stow(), ResetFault(), ClearChange(), SelectBackup(Backup.RATE)], ids=str)
+def test_p5_what_the_daemon_never_orders_never_passes(command: Command) -> None:
+    assert refusal(command, moving(), CONFIG) == "not in its place"
+
+
+@given(st.floats(), st.floats(), st.sampled_from([WriteAndPoll, WriteRegisters]))
+def test_p5_no_register_write_outside_the_limits_passes(az_deg, el_deg, kind) -> None:
+    is_inside = -270.01 <= az_deg <= 270.01 and -0.01 <= el_deg <= 90.01
+    assert is_inside or refusal(kind(az_deg, el_deg), moving(), CONFIG)
+
+
+@given(
+    st.sampled_from(sorted(TrackState)),
+    st.sampled_from(sorted(AcuMode)),
+    st.sampled_from(sorted(Stage)),
+    st.booleans(),
+    st.booleans(),
+    st.sampled_from([None, True, False]),
+    st.sampled_from(["", LATCH]),
+    st.booleans(),
+    st.lists(st.sampled_from(sorted(Request)), max_size=3),
+    st.booleans(),
+)
+def test_p5_whatever_the_memory_holds_every_order_has_passed_the_fence(
+    track, mode, stage, is_remote, is_shadow, arming, latch, is_stop_due, requests, is_fitted
+) -> None:
+    config = replace(GUARDED, is_shadow=is_shadow)
+    state = replace(moving(track, mode), stage=stage, arming=arming, latch=latch, is_stop_due=is_stop_due)
+    seen = saw(status(mode, is_remote_enabled=is_remote), requests=tuple(requests))
+    after, orders = tick(state, seen, FITTED if is_fitted else SKY, NOW, config)
+    assert after.gate_refusal_count == state.gate_refusal_count  # the fence had nothing to keep back
+    for command in (orders.first, orders.extra):
+        assert command is None or refusal(command, after, config) == ""
+    check_hands(after, orders, config)
+
+
+def check_hands(after: ControlState, orders: Orders, config) -> None:
+    sent = orders_of([command for command in (orders.first, orders.extra) if command is not None])
+    if config.is_shadow:
+        assert sent == []
+    elif after.latch or not after.is_armed(config):
+        assert set(sent) <= {Stop(), WriteParameter("W", 0)}
+
+
+# The register watchdog
+
+
+def test_the_watchdog_is_read_written_and_read_back_once_the_start_is_done() -> None:
+    state = replace(ready(TrackState.IDLE, status(AcuMode.STANDBY)), in_force=None)
+    code, asked = 0, []
+    extra = None
+    for k in range(12):
+        state, orders = tick(state, saw(status(AcuMode.STANDBY), extra=extra), SKY, NOW + 0.1 * k, GUARDED)
+        extra = None
+        if isinstance(orders.extra, ReadParameter):
+            extra = Exchange(orders.extra, Parameter("W", code))
+        elif isinstance(orders.extra, WriteParameter):
+            code, extra = orders.extra.code, Exchange(orders.extra, Ack())
+        if extra is not None:
+            asked.append(orders.extra)
+    assert asked == [ReadParameter("W"), WriteParameter("W", 250), ReadParameter("W")]
+    assert state.watchdog is Watchdog.SET
+
+
+@pytest.mark.parametrize("reply", [Nak(), None], ids=["refused", "never answered"])
+def test_an_acu_without_watchdog_is_told_once_and_tracked_all_the_same(reply) -> None:
+    seen = status(backup_selected=Backup.RATE)
+    state, events, sent, last = ready(TrackState.AUTOTRACK_FITTED, seen), [], [], None
+    for k in range(200):
+        extra = Exchange(last, reply if getattr(last, "name", "") == "W" else Ack()) if last is not None else None
+        state, orders = tick(state, saw(seen, extra=extra), FITTED, NOW + 0.1 * k, GUARDED)
+        last = orders.extra
+        events += [event.name for event in orders.events]
+        sent.append(orders.extra)
+    assert events.count("acu.watchdog_refused") == 1
+    assert SelectBackup(Backup.REMOTE) in sent[:40]
