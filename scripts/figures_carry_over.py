@@ -14,7 +14,7 @@ rest after 30 s of lock.
 import argparse
 import json
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +25,7 @@ from tables.skies import Sky, readings_of, real_elements, real_sky
 from acu_daemon.assist.carry_over import CarryOver, aged_prior, carry_over_of, first_fit, why_not
 from acu_daemon.assist.encoder import encoder_look, sigma_deg
 from acu_daemon.assist.full import FullEstimator
+from acu_daemon.assist.full_states import ORBIT, STATE_COUNT
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import AngleBias, FitResult, Readings, Site
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator
@@ -46,7 +47,8 @@ class Row:
     first_aos_deg: float
     plain_aos_deg: float
     carried_aos_deg: float
-    carried_sigma_deg: float  # what the daemon says at AOS
+    carried_sigma_deg: float  # what the daemon says at AOS, the other station's biases included
+    orbit_sigma_deg: float  # the orbit's part of it
     plain_worst_deg: float
     carried_worst_deg: float
     plain_after_lock_deg: float
@@ -76,8 +78,22 @@ def fitted(source: Sgp4Propagator, site: Site, readings: Readings, carried: Carr
     return fit
 
 
+def orbit_alone(fit: FitResult) -> FitResult:
+    """The same, with the covariance of the orbit's six corrections only."""
+    covariance = np.zeros((STATE_COUNT, STATE_COUNT))
+    if fit.covariance is not None:
+        covariance[ORBIT, ORBIT] = fit.covariance[ORBIT, ORBIT]
+    return replace(fit, covariance=covariance)
+
+
+def start_sigma_deg(source: Sgp4Propagator, second: Sky, fit: FitResult) -> float:
+    """1 sigma of the prediction at AOS."""
+    sigma = sigma_deg(source.corrected(fit.correction), second.tai_s[:2], second.site, fit)
+    return float("nan") if sigma is None else float(sigma[0])
+
+
 def one_run(source: Sgp4Propagator, first: Sky, second: Sky, seed: int) -> tuple[float, ...]:
-    """The figures of the second pass with one noise: sigma, then AOS, worst and after the lock, plain and carried."""
+    """The figures of the second pass with one noise: sigmas, then AOS, worst and after the lock, plain and carried."""
     rng = np.random.default_rng(seed)
     carried = carry_over_of(
         fitted(source, first.site, readings_of(first, AngleBias(), NOISE_DEG, rng)), source, first.site
@@ -86,10 +102,10 @@ def one_run(source: Sgp4Propagator, first: Sky, second: Sky, seed: int) -> tuple
     if carried is None or why_not(carried, source, SETTINGS, aos_tai_s):
         raise ValueError(f"{first.name}: nothing to carry over")
     start = first_fit(carried, aged_prior(carried, source, second.site, SETTINGS, aos_tai_s))
-    sigma = sigma_deg(source.corrected(start.correction), second.tai_s[:2], second.site, start)
+    sigmas = [start_sigma_deg(source, second, one) for one in (start, orbit_alone(start))]
     all_readings = readings_of(second, AngleBias(), NOISE_DEG, rng)
     few = all_readings.part(slice(LOCK_S))
-    figures = [float("nan") if sigma is None else float(sigma[0])]
+    figures = sigmas
     for known, given in ((None, None), (start, carried)):
         error = errors_deg(source, second, known)
         after = errors_deg(source, second, fitted(source, second.site, few, given))[LOCK_S:]
@@ -114,7 +130,7 @@ def row_of(first_name: str, second_name: str, elements: str, along_s: float, run
     """Medians over the runs."""
     source, first, second = source_of(elements, along_s), real_sky(first_name), real_sky(second_name)
     runs = np.median([one_run(source, first, second, seed) for seed in range(run_count)], axis=0).tolist()
-    sigma, plain_aos, plain_worst, plain_after, carried_aos, carried_worst, carried_after = runs
+    sigma, orbit_sigma, plain_aos, plain_worst, plain_after, carried_aos, carried_worst, carried_after = runs
     return Row(
         first=first_name,
         second=second_name,
@@ -124,6 +140,7 @@ def row_of(first_name: str, second_name: str, elements: str, along_s: float, run
         plain_aos_deg=plain_aos,
         carried_aos_deg=carried_aos,
         carried_sigma_deg=sigma,
+        orbit_sigma_deg=orbit_sigma,
         plain_worst_deg=plain_worst,
         carried_worst_deg=carried_worst,
         plain_after_lock_deg=plain_after,
@@ -140,10 +157,10 @@ def main() -> None:
     chosen = parser.parse_args()
     if not pairs():
         sys.exit("no real passes: ../shared/data/passes is not there")
-    print(f"{'':62}{'at AOS, no reading':^34}{'worst, no reading':^18}{'after 30 s':^18}")
+    print(f"{'':62}{'at AOS, no reading':^43}{'worst, no reading':^18}{'after 30 s':^18}")
     print(
         f"{'first pass, second pass':44}{'age d':>8}{'after d':>10}"
-        f"{'1st':>8}{'2nd':>8}{'carried':>9}{'sigma':>9}{'2nd':>9}{'carried':>9}{'2nd':>9}{'carried':>9}"
+        f"{'1st':>8}{'2nd':>8}{'carried':>9}{'sigma':>9}{'orbit':>9}{'2nd':>9}{'carried':>9}{'2nd':>9}{'carried':>9}"
     )
     rows = []
     for first, second, elements in pairs():
@@ -152,8 +169,9 @@ def main() -> None:
         label = f"{first.rsplit('-', 1)[0]}, {second.rsplit('-', 2)[1]}"
         print(
             f"{label:44}{row.elements_age_days:8.2f}{row.between_days:10.2f}{row.first_aos_deg:8.4f}"
-            f"{row.plain_aos_deg:8.4f}{row.carried_aos_deg:9.4f}{row.carried_sigma_deg:9.4f}{row.plain_worst_deg:9.4f}"
-            f"{row.carried_worst_deg:9.4f}{row.plain_after_lock_deg:9.4f}{row.carried_after_lock_deg:9.4f}",
+            f"{row.plain_aos_deg:8.4f}{row.carried_aos_deg:9.4f}{row.carried_sigma_deg:9.4f}{row.orbit_sigma_deg:9.4f}"
+            f"{row.plain_worst_deg:9.4f}{row.carried_worst_deg:9.4f}{row.plain_after_lock_deg:9.4f}"
+            f"{row.carried_after_lock_deg:9.4f}",
             flush=True,
         )
     if chosen.json:
