@@ -12,6 +12,7 @@ from acu_daemon import PROCESS_START_S
 from acu_daemon.config import SatelliteFile, StationFile, load_satellite, load_station
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.elements_file import LoadedElements, load_elements
+from acu_daemon.edge.state import refuse_world_writable
 from acu_daemon.errors import ElementsError, UsageError
 from acu_daemon.model import Pass
 from acu_daemon.orbit.passes import find_passes
@@ -86,6 +87,8 @@ class Target:
 
 def load_target(config: Path, name: str, now_tai_s: float, *, is_strict: bool = True) -> Target:
     """Read both files and the elements.  With is_strict, elements that must not be used raise ElementsError."""
+    for directory in (config, config / "satellites"):
+        refuse_world_writable(directory)
     base = load_station(config)
     satellite, station = load_satellite(config, name, base)
     elements = load_elements(satellite, config / "satellites" / f"{name}.toml", now_tai_s, station.site.orientation)

@@ -2,12 +2,13 @@
 
 import asyncio
 import contextlib
+import faulthandler
 import gc
 import math
+import os
 import sys
 import time
-from dataclasses import asdict
-from functools import partial
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,8 +16,8 @@ import structlog
 import typer
 
 from acu_daemon import PROCESS_START_S
-from acu_daemon.assist.carry_over import CarryOver, carry_over_of, why_not
-from acu_daemon.assist.estimator import has_covariance
+from acu_daemon.assist.carry_over import CarryOver
+from acu_daemon.cli.kept import Kept, open_kept
 from acu_daemon.cli.options import (
     STOP_SIGNALS,
     At,
@@ -35,7 +36,6 @@ from acu_daemon.daemon.area import Snapshot
 from acu_daemon.daemon.health import Health
 from acu_daemon.daemon.live import LiveLine
 from acu_daemon.daemon.service import Outcome, PassJob, Service
-from acu_daemon.edge.carry_over import FitKeeper, carry_over_path, read_carry_over
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.fit import ProcessFitRunner
 from acu_daemon.edge.link import Link, check_rate, make_link
@@ -47,6 +47,8 @@ from acu_daemon.edge.writer import QueuedStream, Writer
 from acu_daemon.model import Pass
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.protocol.sa3842 import address_byte
+
+STDERR = 2
 
 
 def command(
@@ -75,6 +77,9 @@ def command(
 
     Exit status: 0 done; 1 the satellite was never acquired; 2 wrong use or configuration; 3 no ACU within 10 s.
     """
+    os.umask(0o027)  # what is left belongs to this user and its group
+    if not faulthandler.is_enabled():
+        faulthandler.enable(STDERR)  # the service's watchdog ends a hung daemon by SIGABRT: say where it hung
     check_duration(duration)
     clock = make_clock(at, at_monotonic)
     target = load_target(config, satellite, clock.tai_s())
@@ -97,12 +102,11 @@ def command(
         )
         recording = ends.enter_context(RecordingWriter(record, files, clock.tai_s())) if record is not None else None
         _announce(target, coming, clock)
-        kept = carry_over_path(directory, target.satellite.satellite.norad_id, target.satellite.satellite.name)
-        carried = _carried(target, kept, clock.tai_s())
-        job = make_job(target, coming, link, is_rehearsal=clock.is_rehearsal, end_tai_s=end_tai_s, carried=carried)
-        keeper = _keeper(target, kept, files)
-        ends.callback(keeper.flush)
-        outcome = asyncio.run(_run(job, link, clock, live, recording, SnapshotFile(directory, files), keeper))
+        kept = open_kept(directory, target, coming, clock, files)
+        ends.callback(kept.flush)
+        job = make_job(target, coming, link, is_rehearsal=clock.is_rehearsal, end_tai_s=end_tai_s, carried=kept.carried)
+        job = replace(job, arming=kept.arming, latch=kept.latch)
+        outcome = asyncio.run(_run(job, link, clock, live, recording, SnapshotFile(directory, files), kept))
         structlog.get_logger("run").info("run.done", **asdict(outcome))
     if (
         outcome.has_begun
@@ -110,28 +114,6 @@ def command(
         and outcome.reason not in {number.name for number in STOP_SIGNALS}
     ):
         raise typer.Exit(1)
-
-
-def _carried(target: Target, path: Path, now_tai_s: float) -> CarryOver | None:
-    """What the last pass of the satellite left, where it may be used."""
-    carried = read_carry_over(path) if has_covariance(target.station.tracking.estimator) else None
-    if carried is None:
-        return None
-    log: Any = structlog.get_logger("carry_over")
-    reason = why_not(
-        carried, target.elements.propagator, estimator_settings(target.station, target.satellite), now_tai_s
-    )
-    if reason:
-        log.warning("carry_over.dropped", reason=reason, file=str(path))
-        return None
-    parts = "orbit and biases" if carried.station == target.station.site.station else "orbit"
-    log.info("carry_over.used", age_h=round((now_tai_s - carried.at_tai_s) / 3600.0, 2), of=parts)
-    return carried
-
-
-def _keeper(target: Target, path: Path, files: Writer) -> FitKeeper:
-    make = partial(carry_over_of, source=target.elements.propagator, site=target.station.site)
-    return FitKeeper(path, target.elements.label, make, files)
 
 
 def make_job(
@@ -192,7 +174,7 @@ async def _run(
     live: LiveLine | None,
     recording: RecordingWriter | None,
     snapshots: SnapshotFile,
-    keeper: FitKeeper,
+    kept: Kept,
 ) -> Outcome:
     notifier = Notifier()
     health = Health(notifier)
@@ -210,7 +192,8 @@ async def _run(
         ProcessFitRunner(job.refit),
         on_snapshot=show,
         on_reading=recording.add if recording else None,
-        on_fit=keeper.offer,
+        on_fit=kept.offer,
+        on_state=kept.see,
     )
     loop = asyncio.get_running_loop()
     for number in STOP_SIGNALS:

@@ -121,11 +121,11 @@ def from_json(read: Any) -> CarryOver:
     elements, station = read["elements"], read["station"]
     east_m, north_m, up_m = _numbers(read["station_shift_enu_m"], (3,)).tolist()
     return CarryOver(
-        at_tai_s=_number(read["at_tai_s"]),
+        at_tai_s=number(read["at_tai_s"]),
         estimator=str(read["estimator"]),
         station=Station(str(station["name"]), **_fields(station, Station, text="name")),
         elements_kind=str(elements["kind"]),
-        elements_epoch_tai_s=_number(elements["epoch_tai_s"]),
+        elements_epoch_tai_s=number(elements["epoch_tai_s"]),
         states=_numbers(elements["states_teme_m_m_s"], (2, 6)),
         correction=Correction(**_fields(read["correction"], Correction)),
         bias=AngleBias(**_fields(read["bias"], AngleBias)),
@@ -134,7 +134,7 @@ def from_json(read: Any) -> CarryOver:
     )
 
 
-def _number(value: Any) -> float:
+def number(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise ValueError(f"{value!r}: expected a number")
     return float(value)
@@ -144,7 +144,7 @@ def _fields(values: Any, kind: type[Correction | AngleBias | Station], text: str
     names = {field.name for field in fields(kind)}
     if not isinstance(values, dict) or set(values) != names:
         raise ValueError(f"expected {', '.join(sorted(names))}")
-    return {name: _number(value) for name, value in values.items() if name != text}
+    return {name: number(value) for name, value in values.items() if name != text}
 
 
 def _numbers(values: Any, shape: tuple[int, ...]) -> Array:

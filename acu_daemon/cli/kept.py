@@ -1,0 +1,104 @@
+"""What a run finds in the state directory, and what it leaves there for a restart and for the next pass."""
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import structlog
+
+from acu_daemon.assist.carry_over import CarryOver, carry_over_of, resume_of, why_not, why_not_resume
+from acu_daemon.assist.estimator import has_covariance
+from acu_daemon.cli.options import Target
+from acu_daemon.config import estimator_settings
+from acu_daemon.control.state import ControlState
+from acu_daemon.edge.carry_over import FitKeeper, carry_over_path, read_carry_over
+from acu_daemon.edge.clock import SystemClock
+from acu_daemon.edge.run_state import RunState, RunStateKeeper, read_run_state
+from acu_daemon.edge.writer import Writer
+from acu_daemon.model import FitResult, Pass
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """What was left, and the two that keep what this run leaves.
+
+    carried: the fit of this pass, where the daemon is started again in it, else what the last pass left.
+    arming: as a person left it in this pass; None: as configured.  latch: until a person clears it, whatever the pass.
+    """
+
+    carried: CarryOver | None
+    arming: bool | None
+    latch: str
+    carry_over: FitKeeper
+    run_state: RunStateKeeper
+
+    def offer(self, fit: FitResult) -> None:
+        """Take an accepted fit."""
+        self.carry_over.offer(fit)
+        self.run_state.offer(fit)
+
+    def see(self, state: ControlState) -> None:
+        """Take the memory of a tick."""
+        self.run_state.see(state)
+
+    def flush(self) -> None:
+        """Save what is not saved yet."""
+        self.carry_over.flush()
+
+
+def open_kept(directory: Path, target: Target, coming: Pass, clock: SystemClock, files: Writer) -> Kept:
+    """Read what was left; say in the log what of it is used."""
+    source, site, now_tai_s = target.elements.propagator, target.station.site, clock.tai_s()
+    clock_s = now_tai_s - clock.monotonic_s() if clock.is_rehearsal else None
+    left = read_run_state(directory)
+    is_same_pass = left.is_of(target.elements.label, coming, clock_s)
+    resumed = _resumed(left, target, now_tai_s) if is_same_pass else None
+    path = carry_over_path(directory, target.satellite.satellite.norad_id, target.satellite.satellite.name)
+    first = RunState(
+        satellite=target.elements.label,
+        rise_tai_s=coming.rise_tai_s,
+        set_tai_s=coming.set_tai_s,
+        clock_s=clock_s,
+        arming=left.arming if is_same_pass else None,
+        latch=left.latch,
+        fit=resumed,
+    )
+    return Kept(
+        carried=resumed or _carried(target, path, now_tai_s),
+        arming=first.arming,
+        latch=first.latch,
+        carry_over=FitKeeper(path, target.elements.label, partial(carry_over_of, source=source, site=site), files),
+        run_state=RunStateKeeper(directory, files, first, partial(resume_of, source=source, site=site)),
+    )
+
+
+def _resumed(left: RunState, target: Target, now_tai_s: float) -> CarryOver | None:
+    """The fit of this pass, where it can be gone on from."""
+    log: Any = structlog.get_logger("run_state")
+    if left.fit is None:
+        return None
+    station = target.station
+    reason = why_not_resume(left.fit, target.elements.propagator, station.site, station.tracking.estimator, now_tai_s)
+    if reason:
+        log.warning("run_state.dropped", reason=reason)
+        return None
+    log.info("run.resumed", state=left.track, fit_age_s=round(now_tai_s - left.fit.at_tai_s, 1))
+    return left.fit
+
+
+def _carried(target: Target, path: Path, now_tai_s: float) -> CarryOver | None:
+    """What the last pass of the satellite left, where it may be used."""
+    carried = read_carry_over(path) if has_covariance(target.station.tracking.estimator) else None
+    if carried is None:
+        return None
+    log: Any = structlog.get_logger("carry_over")
+    reason = why_not(
+        carried, target.elements.propagator, estimator_settings(target.station, target.satellite), now_tai_s
+    )
+    if reason:
+        log.warning("carry_over.dropped", reason=reason, file=str(path))
+        return None
+    parts = "orbit and biases" if carried.station == target.station.site.station else "orbit"
+    log.info("carry_over.used", age_h=round((now_tai_s - carried.at_tai_s) / 3600.0, 2), of=parts)
+    return carried

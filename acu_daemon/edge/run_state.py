@@ -1,0 +1,154 @@
+"""What a restart needs (run.json in the state directory): the pass in progress, its newest fit, arming, latch.
+
+Written whole, beside the loop, at every accepted fit and whenever state, arming or latch change.
+"""
+
+import contextlib
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import structlog
+
+from acu_daemon.assist.carry_over import CarryOver
+from acu_daemon.control.state import ControlState
+from acu_daemon.edge.carry_over import from_json, number, to_json
+from acu_daemon.edge.writer import Latest, Writer, replace_file
+from acu_daemon.errors import OrbitError
+from acu_daemon.model import FitResult, Pass
+from acu_daemon.orbit.timescales import utc_text
+
+VERSION = 1
+RUN_STATE = "run.json"
+SAME_CLOCK_S = 1.0
+_LARGEST_BYTES = 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class RunState:
+    """How far a run had come.  clock_s: of a rehearsal, TAI minus CLOCK_MONOTONIC: another start is another one."""
+
+    satellite: str = ""
+    rise_tai_s: float = math.inf
+    set_tai_s: float = -math.inf
+    clock_s: float | None = None
+    track: str = ""
+    arming: bool | None = None  # as a person left it; None: as configured
+    latch: str = ""
+    fit: CarryOver | None = None
+
+    def is_of(self, satellite: str, coming: Pass, clock_s: float | None) -> bool:
+        """Whether this is the same pass of the same satellite, and of the same rehearsal."""
+        if (clock_s is None) != (self.clock_s is None):
+            return False
+        is_same_clock = clock_s is None or self.clock_s is None or abs(clock_s - self.clock_s) < SAME_CLOCK_S
+        is_same_time = self.rise_tai_s < coming.set_tai_s and coming.rise_tai_s < self.set_tai_s
+        return is_same_clock and is_same_time and satellite == self.satellite
+
+
+def read_run_state(directory: Path) -> RunState:
+    """Read run.json; the defaults where there is none, or, with an alarm in the log, where it cannot be used.
+
+    One that cannot be used is kept beside it as run.json.bad.
+    """
+    path = directory / RUN_STATE
+    try:
+        with path.open("rb") as file:
+            return _from_json(json.loads(file.read(_LARGEST_BYTES)))
+    except FileNotFoundError:
+        return RunState()
+    except (OSError, ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
+        bad = path.with_name(f"{RUN_STATE}.bad")
+        structlog.get_logger("run_state").error(
+            "run_state.unreadable",
+            file=str(path),
+            reason=f"{type(error).__name__}: {error}",
+            action=f"begun anew, without latch and arming; kept as {bad.name}",
+        )
+        with contextlib.suppress(OSError):
+            path.replace(bad)
+        return RunState()
+
+
+class RunStateKeeper:
+    """Writes run.json.  The loop never waits for the disk, and a write that fails never stops a pass."""
+
+    def __init__(
+        self, directory: Path, writer: Writer, first: RunState, resume_of: Callable[[FitResult], CarryOver | None]
+    ) -> None:
+        self._path = directory / RUN_STATE
+        self._state = first
+        self._resume_of = resume_of
+        self._latest: Latest[tuple[RunState, FitResult | None]] = Latest(writer, self._save)
+        self._fit: FitResult | None = None
+        self._has_failed = False
+
+    def offer(self, fit: FitResult) -> None:
+        """Take an accepted fit."""
+        self._fit = fit
+        self._latest.offer((self._state, fit))
+
+    def see(self, state: ControlState) -> None:
+        """Take the memory of a tick; it is written where it differs."""
+        seen = replace(self._state, track=str(state.track), arming=state.arming, latch=state.latch)
+        if seen != self._state:
+            self._state = seen
+            self._latest.offer((seen, self._fit))
+
+    def _save(self, newest: tuple[RunState, FitResult | None]) -> None:
+        state, fit = newest
+        try:
+            kept = None if fit is None else self._resume_of(fit)
+            text = json.dumps(_to_json(replace(state, fit=kept or state.fit)), indent=1, allow_nan=False)
+            replace_file(self._path, text.encode("ascii"))
+        except (OSError, ValueError, OrbitError) as error:
+            if not self._has_failed:
+                structlog.get_logger("run_state").error("run_state.not_saved", file=str(self._path), reason=str(error))
+            self._has_failed = True
+            return
+        if self._has_failed:
+            structlog.get_logger("run_state").info("run_state.saved_again", file=str(self._path))
+            self._has_failed = False
+
+
+def _to_json(state: RunState) -> dict[str, Any]:
+    return {
+        "version": VERSION,
+        "satellite": state.satellite,
+        "rise_utc": utc_text(state.rise_tai_s),
+        "rise_tai_s": state.rise_tai_s,
+        "set_tai_s": state.set_tai_s,
+        "clock_s": state.clock_s,
+        "state": state.track,
+        "arming": state.arming,
+        "latch": state.latch,
+        "fit": None if state.fit is None else to_json(state.satellite, state.fit),
+    }
+
+
+def _from_json(read: Any) -> RunState:
+    """Raises: ValueError, TypeError, KeyError: what is wrong."""
+    if not isinstance(read, dict) or read.get("version") != VERSION:
+        raise ValueError(f"expected a JSON object with version {VERSION}")
+    arming, clock_s = read["arming"], read["clock_s"]
+    if not (arming is None or isinstance(arming, bool)):
+        raise ValueError(f"arming = {arming!r}: expected true, false or null")
+    return RunState(
+        satellite=_text(read["satellite"]),
+        rise_tai_s=number(read["rise_tai_s"]),
+        set_tai_s=number(read["set_tai_s"]),
+        clock_s=None if clock_s is None else number(clock_s),
+        track=_text(read["state"]),
+        arming=arming,
+        latch=_text(read["latch"]),
+        fit=None if read["fit"] is None else replace(from_json(read["fit"]), is_of_this_pass=True),
+    )
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise ValueError(f"{value!r}: expected a text")
+    return value
