@@ -144,7 +144,7 @@ def _along_rad(prior: Prior, at_tai_s: float) -> float:
 
 
 def test_what_a_low_orbit_leaves_is_worth_less_than_what_a_high_one_does() -> None:
-    """After three days 4e-7 rad/min a day of drag are 18 km; the perigee, 7 km lower, and the mean motion add a tenth."""
+    """After three days 4e-7 rad/min a day of drag are 18 km; perigee and mean motion add a tenth."""
     at_tai_s = CARRIED.at_tai_s + 3.0 * DAY_S
     sigmas = []
     for height_km in (400.0, 800.0):
