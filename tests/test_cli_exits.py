@@ -13,7 +13,7 @@ from acu_daemon.cli.options import coming_pass, load_target, make_clock, parse_u
 from acu_daemon.errors import ConfigError, ElementsError, LinkError, NoAcuError, OrbitError, UsageError
 from acu_daemon.orbit.timescales import tai_from_utc
 
-COMMANDS = ("run", "fake-acu", "demo", "passes", "check", "replay")
+COMMANDS = ("run", "fake-acu", "demo", "passes", "check", "replay", "arm", "disarm", "clear", "status")
 
 
 @pytest.mark.parametrize(

@@ -37,6 +37,7 @@ from acu_daemon.daemon.health import Health
 from acu_daemon.daemon.live import LiveLine
 from acu_daemon.daemon.service import Outcome, PassJob, Service
 from acu_daemon.edge.clock import SystemClock
+from acu_daemon.edge.control_socket import ControlSocket
 from acu_daemon.edge.fit import ProcessFitRunner
 from acu_daemon.edge.link import Link, check_rate, make_link
 from acu_daemon.edge.logs import configure_logs, tell_dropped
@@ -69,6 +70,10 @@ def command(
             "--state", metavar="DIR", help="Where state is kept.  Default: $STATE_DIRECTORY, else the XDG state home."
         ),
     ] = None,
+    shadow: Annotated[
+        bool,
+        typer.Option("--shadow", help="Command nothing: poll, fit, predict and record while somebody else steers."),
+    ] = False,
 ) -> None:
     """Track a satellite: the pass in progress, else the next one.
 
@@ -101,12 +106,13 @@ def command(
             writer=output,
         )
         recording = ends.enter_context(RecordingWriter(record, files, clock.tai_s())) if record is not None else None
-        _announce(target, coming, clock)
+        _announce(target, coming, clock, is_shadow=shadow)
         kept = open_kept(directory, target, coming, clock, files)
         ends.callback(kept.flush)
         job = make_job(target, coming, link, is_rehearsal=clock.is_rehearsal, end_tai_s=end_tai_s, carried=kept.carried)
+        job = replace(job, control=replace(job.control, is_shadow=shadow))
         job = replace(job, arming=kept.arming, latch=kept.latch)
-        outcome = asyncio.run(_run(job, link, clock, live, recording, SnapshotFile(directory, files), kept))
+        outcome = asyncio.run(_run(job, link, clock, live, recording, SnapshotFile(directory, files), kept, directory))
         structlog.get_logger("run").info("run.done", **asdict(outcome))
     if (
         outcome.has_begun
@@ -147,7 +153,7 @@ def make_job(
     )
 
 
-def _announce(target: Target, coming: Pass, clock: SystemClock) -> None:
+def _announce(target: Target, coming: Pass, clock: SystemClock, *, is_shadow: bool) -> None:
     log: Any = structlog.get_logger("run")
     log.info(
         "run.start",
@@ -163,8 +169,11 @@ def _announce(target: Target, coming: Pass, clock: SystemClock) -> None:
     )
     for warning in target.elements.warnings:
         log.warning("elements.warning", reason=warning)
-    if target.station.safety.arm == "manual":
-        log.warning("run.disarmed", reason='[safety] arm = "manual": nothing is written to the ACU')
+    if is_shadow:
+        log.warning("run.shadow", reason="--shadow: nothing is written to the ACU, whatever happens")
+    elif target.station.safety.arm == "manual":
+        reason = '[safety] arm = "manual": nothing is written to the ACU until `acu-daemon arm`'
+        log.warning("run.disarmed", reason=reason)
 
 
 async def _run(
@@ -175,6 +184,7 @@ async def _run(
     recording: RecordingWriter | None,
     snapshots: SnapshotFile,
     kept: Kept,
+    directory: Path,
 ) -> Outcome:
     notifier = Notifier()
     health = Health(notifier)
@@ -198,11 +208,16 @@ async def _run(
     loop = asyncio.get_running_loop()
     for number in STOP_SIGNALS:
         loop.add_signal_handler(number, service.stop, number.name)
+    control = ControlSocket(directory, service.answer)
+    await control.open()
     gc.collect()
     gc.freeze()  # a full collection over the start-up heap would stall a tick by tens of milliseconds
+    sync = asyncio.create_task(clock.watch_synchronisation())
     try:
         return await service.run()
     finally:
+        sync.cancel()
+        await control.close()
         notifier.close()
         if live is not None:
             live.clear()
