@@ -1,0 +1,67 @@
+"""Every fault in a short flight in virtual time: what shows, how far the beam goes, how soon it is back (P2 to P8).
+
+The signal is lost at 11 s and comes back at 24 s; most faults come between, where only the daemon holds the antenna.
+"""
+
+import pytest
+from fault_flights import CASES, ON_PATH_DEG, T, flown, measure
+from flights import commands_between, events_named, rows_between, seconds_to_state
+
+from acu_daemon.protocol.messages import Poll, ReadFaults, ReadParameter, Stop, WriteParameter
+from acu_daemon.sim.fault_verbs import FRAME_VERBS, PEDESTAL_VERBS, VERBS
+
+LINK_LOST_S = 0.7  # half a second of silence, and the tick that sees it
+UNHARMED = {"silence"}  # the loss itself, in every flight
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_fault_is_shown_survived_and_the_path_taken_up_again(name: str) -> None:
+    """P2, P3, P5, P8: no command outside the envelope, none in a burst, none stale; on the path again in time."""
+    case, seen = CASES[name], measure(name)
+    assert [state for state in seen.states if state in case.shows] == list(case.shows)
+    assert case.says in ("", *seen.events)
+    assert (seen.outside_count, seen.burst_count, seen.stale_count) == (0, 0, 0)
+    assert seen.recovered_s <= case.recovers_s
+    assert seen.after_deg <= ON_PATH_DEG
+    assert seen.end_state == "AUTOTRACK/FITTED"
+
+
+@pytest.mark.parametrize("name", [name for name, case in CASES.items() if "LINK-LOST" in case.shows])
+def test_a_silent_link_is_shown_within_half_a_second(name: str) -> None:
+    """P2."""
+    assert seconds_to_state(flown(name), "LINK-LOST", T + CASES[name].from_s) <= LINK_LOST_S
+
+
+LATCHES = [name for name, case in CASES.items() if case.clear_s is not None]
+
+
+@pytest.mark.parametrize("name", LATCHES)
+def test_a_latched_axis_is_stopped_and_told_nothing_until_a_person_clears_it(name: str) -> None:
+    """P6."""
+    flight, cleared_s = flown(name), CASES[name].clear_s or 0.0
+    latched_s = seconds_to_state(flight, "FAULT", T)
+    told = [type(command) for command in commands_between(flight, T + latched_s - 0.05, T + cleared_s)]
+    assert Stop in told[:2]
+    assert set(told) <= {Stop, Poll, ReadFaults, ReadParameter, WriteParameter}
+    standing = [
+        row.encoder_az_deg + row.encoder_el_deg for row in rows_between(flight, T + latched_s + 2, T + cleared_s)
+    ]
+    assert max(standing) - min(standing) < 0.01
+    assert any(seen.latch for seen in flight.snapshots if T + latched_s < seen.tai_s < T + cleared_s)
+
+
+@pytest.mark.parametrize("name", sorted(CASES.keys() - set(LATCHES)))
+def test_no_passing_fault_latches_an_axis(name: str) -> None:
+    """P6."""
+    assert "axis.latched" not in measure(name).events
+
+
+def test_every_verb_of_the_vocabulary_is_flown() -> None:
+    verbs = {fault.split()[0] for case in CASES.values() for fault in case.faults}
+    assert verbs == set(VERBS) - UNHARMED
+    assert set() == FRAME_VERBS & PEDESTAL_VERBS
+
+
+def test_what_xor_cannot_see_is_doubted_and_said_once_a_second_at_most() -> None:
+    times = [event["count"] for event in events_named(flown("xor-blind"), "acu.doubted")]
+    assert 1 <= len(times) <= 4
