@@ -4,7 +4,7 @@ The signal is lost at 11 s and comes back at 24 s; most faults come between, whe
 """
 
 import pytest
-from fault_flights import CASES, ON_PATH_DEG, T, flown, measure
+from fault_flights import CASES, FAULT_S, ON_PATH_DEG, T, flown, measure
 from flights import commands_between, events_named, rows_between, seconds_to_state
 
 from acu_daemon.protocol.messages import Poll, ReadFaults, ReadParameter, Stop, WriteParameter
@@ -54,6 +54,15 @@ def test_a_latched_axis_is_stopped_and_told_nothing_until_a_person_clears_it(nam
 def test_no_passing_fault_latches_an_axis(name: str) -> None:
     """P6."""
     assert "axis.latched" not in measure(name).events
+
+
+@pytest.mark.parametrize("name", ["no-reply 3 in 10", "late-reply", "shifted", "bad-checksum", "truncated"])
+def test_a_line_that_garbles_or_loses_replies_is_an_alarm_until_it_is_good_again(name: str) -> None:
+    flight = flown(name)
+    assert [len(events_named(flight, event)) for event in ("link.poor", "link.good")] == [1, 1]
+    alarmed = [seen.tai_s - T for seen in flight.snapshots if "bad replies" in seen.line_alarm]
+    assert FAULT_S < alarmed[0] < FAULT_S + 3.0
+    assert alarmed[-1] < FAULT_S + 9.0
 
 
 def test_every_verb_of_the_vocabulary_is_flown() -> None:

@@ -73,6 +73,7 @@ class Snapshot:
     latch: str = ""  # what an axis did wrong; cleared by a person
     encoder_problem: str = ""
     clock_alarm: str = ""
+    line_alarm: str = ""
     clamped_count: int = 0  # followed writes that the gate held back to what the axes can do
     rejecting: str = ""  # why the newest readings are not fitted
     rejected_counts: dict[str, int] = field(default_factory=dict)  # readings so far, by reason

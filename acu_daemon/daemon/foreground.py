@@ -16,6 +16,7 @@ from acu_daemon.control.states import AUTOTRACKING
 from acu_daemon.control.tick import tick
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.clock_watch import ClockWatch
+from acu_daemon.daemon.line_watch import LineWatch
 from acu_daemon.daemon.port import AcuPort, Answer
 from acu_daemon.daemon.stopping import stop_antenna
 from acu_daemon.edge.clock import Clock
@@ -71,6 +72,7 @@ class Foreground:
         self.write_count = 0
         self.answered_count = 0  # ordered exchanges that were answered: the work that the watchdog asks for
         self.skipped_tick_count = 0
+        self.line_watch = LineWatch(port, self._doubt)
         self.clock_watch = ClockWatch(clock, config.clock_alarm_deg)
         self._lateness_s = np.zeros(LATENESS_KEPT)
 
@@ -91,6 +93,7 @@ class Foreground:
             await self._hurry(due_tai_s)
             if self.tick_count % 10 == 0:
                 self.clock_watch.look(self._area.sky.prediction)
+                self.line_watch.look()
             self._after_tick()
             missed = max(0, math.floor((self._clock.tai_s() - due_tai_s) / period_s))
             self.skipped_tick_count += missed

@@ -251,6 +251,7 @@ class Service:
             disarmed_by=state.disarmed_by,
             latch=state.latch,
             clock_alarm=self._foreground.clock_watch.alarm,
+            line_alarm=self._foreground.line_watch.alarm,
             encoder_problem=state.encoders.problem,
             is_link_up=self._port.is_up,
             link_problem=self._port.problem,
