@@ -29,6 +29,7 @@ from pathlib import Path
 
 from pass_rig import DEFAULT_PASS, LINKS, BenchError, Rig, make_scene, run_pass
 from real_pass import pass_names
+from tables.outputs import output_file
 
 from acu_daemon.cli.options import load_target
 from acu_daemon.errors import AcuDaemonError
@@ -154,7 +155,7 @@ def main() -> int:
         "--window", type=float, metavar="S", help="only this many seconds around the middle of the pass"
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="keep traces and logs here (a new directory)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures here")
+    parser.add_argument("--json", type=output_file, metavar="FILE", help="also write the figures here")
     options = parser.parse_args()
     if options.window is not None and not options.window >= MIN_WINDOW_S:
         parser.error(f"--window {options.window:g}: expected at least {MIN_WINDOW_S:g} s, to lock, lose and relock")

@@ -17,7 +17,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -25,6 +24,8 @@ from pathlib import Path
 import numpy as np
 from real_pass import pass_names, truth_path, truth_span, write_config
 from skyfield.api import EarthSatellite, load, wgs84
+from tables.outputs import output_file
+from tables.workers import run_script, worker_pool
 
 from acu_daemon.assist.estimator import EstimatorSettings, make_estimator
 from acu_daemon.assist.inversion import KnownElements, direction_cosines, invert
@@ -367,17 +368,17 @@ def repeat_check() -> tuple[float, int, bool]:
     return float(np.median(seconds)), len(first), first == second
 
 
-def main() -> None:
+def main() -> int:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", default="", help="passes whose name holds this")
-    parser.add_argument("--json", type=Path, help="write the figures here")
+    parser.add_argument("--json", type=output_file, help="write the figures here")
     chosen = parser.parse_args()
     jobs = [(name, case) for name in pass_names() if chosen.only in name for case in CASES]
     if not jobs:
         sys.exit("no real passes: ../shared/data/passes is not there, or --only fits none")
     rows: list[Row] = []
-    with ProcessPoolExecutor(2) as pool:
+    with worker_pool() as pool:
         print(
             f"{'pass':42} {'case':17} {'worst':>7} {'any':>7} {'lost s':>6} {'limit':>6} {'relock':>6} {'regist':>7}  s"
         )
@@ -401,7 +402,8 @@ def main() -> None:
     if chosen.json:
         figures = {"passes": [asdict(row) for row in rows], "seed_check": check, "microseconds": cost}
         chosen.json.write_text(json.dumps(figures | {"virtual_pass_s": flight_s, "is_repeatable": is_same}, indent=1))
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

@@ -15,12 +15,13 @@ import argparse
 import json
 import sys
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from real_pass import pass_names
+from tables.outputs import output_file
 from tables.seed_001 import sky_angles_deg
 from tables.skies import Sky, readings_of, real_elements, real_sky
+from tables.workers import run_script
 
 from acu_daemon.assist.carry_over import CarryOver, aged_prior, carry_over_of, first_fit, why_not
 from acu_daemon.assist.encoder import encoder_look, sigma_deg
@@ -148,12 +149,12 @@ def row_of(first_name: str, second_name: str, elements: str, along_s: float, run
     )
 
 
-def main() -> None:
+def main() -> int:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--along-s", type=float, default=0.0, help="seconds that the elements are made wrong")
     parser.add_argument("--runs", type=int, default=10, help="runs with other noise; default 10")
-    parser.add_argument("--json", type=Path, help="write the figures here")
+    parser.add_argument("--json", type=output_file, help="write the figures here")
     chosen = parser.parse_args()
     if not pairs():
         sys.exit("no real passes: ../shared/data/passes is not there")
@@ -176,7 +177,8 @@ def main() -> None:
         )
     if chosen.json:
         chosen.json.write_text(json.dumps({"along_s": chosen.along_s, "rows": [asdict(row) for row in rows]}, indent=1))
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from real_pass import truth_path
 from tables.skies import real_elements, real_sky
+from tables.workers import run_script
 
 from acu_daemon.assist.encoder import encoder_look
 from acu_daemon.assist.full import FullEstimator
@@ -277,7 +278,7 @@ def _first_lock(right_deg: float, up_deg: float, seconds: tuple[float, ...]) -> 
         yield f"{np.degrees(off.max()):.3f}"
 
 
-def main() -> None:
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0] if __doc__ else None)
     parser.add_argument("--only", default="", metavar="WORD", help="the kinds with that word in their name")
     parser.add_argument("--runs", type=int, default=2, metavar="N", help="noises for each pass (default %(default)s)")
@@ -285,7 +286,8 @@ def main() -> None:
     asked = parser.parse_args()
     for line in first_locks() if asked.first_locks else bad_minutes(asked.only, asked.runs):
         print(line, flush=True)
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    run_script(main)

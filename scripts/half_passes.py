@@ -13,15 +13,11 @@ for the ellipses alone; it needs brahe (pip install 'acu-daemon[accuracy]') and 
 
 import argparse
 import json
-import multiprocessing
-import os
-import sys
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 from real_pass import pass_names
@@ -30,10 +26,12 @@ from tables.console import progress, say
 from tables.errors_put_in import azimuth_model_deg, corrupted_state, draw_errors, elevation_model_deg, readings_with
 from tables.listed_passes import Wrong, accurate, as_assumed, dragged, late, listed_passes
 from tables.methods import METHODS
+from tables.outputs import output_file, output_picture
 from tables.seed_figures import PASSES, SeedPass
 from tables.skies import Sky, readings_of, real_elements, real_sky
 from tables.trials import ASKED_WORST_DEG, Trial, tried
 from tables.true_pass import TruePass, true_passes
+from tables.workers import run_script, worker_pool
 
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import AngleBias, Readings
@@ -166,8 +164,7 @@ def all_trials(draws: int, listed_count: int) -> dict[str, list[Trial]]:
     jobs = real_jobs(draws)
     for (label, wrong), seed in zip(LISTED.items(), np.random.SeedSequence(SEED).spawn(len(LISTED)), strict=True):
         jobs += [(label, partial(listed_trials, wrong, one)) for one in seed.spawn(listed_count // CHUNK)]
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # for the processes to come: one each is enough
-    with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
+    with worker_pool() as pool:
         if find_spec("brahe") is None:
             say("the papers' simulation is left out: it needs brahe, pip install -c constraints.txt '.[accuracy]'")
         else:
@@ -215,8 +212,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--draws", type=int, default=10, help="of the noise, for every real pass and papers' pass (10)")
     parser.add_argument("--listed", type=int, default=240, help="listed passes of each kind (240)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures here")
-    parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the real passes (PNG)")
+    parser.add_argument("--json", type=output_file, metavar="FILE", help="write the figures here")
+    parser.add_argument("--plot", type=output_picture, metavar="FILE", help="draw the real passes (PNG)")
     chosen = parser.parse_args()
     if not pass_names():
         say("no real passes: ../shared/data/passes is not there")
@@ -237,4 +234,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_script(main)

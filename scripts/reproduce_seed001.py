@@ -9,19 +9,16 @@ Errors are angles on the sky.  It needs brahe: pip install -c constraints.txt '.
 """
 
 import argparse
-import multiprocessing
-import os
-import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 from tables.charts_seed_001 import plot_losses, plot_sensitivity
 from tables.console import progress, say
 from tables.landsat import PERIGEES_DEG, LandsatPass, landsat_passes
+from tables.outputs import output_folder
 from tables.seed_001 import (
     A_ERRORS_KM,
     EXPERIMENTS,
@@ -34,6 +31,7 @@ from tables.seed_001 import (
     verdict,
     where_beyond,
 )
+from tables.workers import run_script, worker_pool
 
 LOSS_STEP_S, SENSITIVITY_STEP_S = 10, 40
 SEED = 1982
@@ -117,24 +115,22 @@ def _seconds(value: float) -> str:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--plots", type=Path, metavar="DIR", help="draw the figures there")
+    parser.add_argument("--plots", type=output_folder, metavar="DIR", help="draw the figures there")
     chosen = parser.parse_args()
     if find_spec("brahe") is None:
         say("the reference orbit needs brahe: pip install -c constraints.txt '.[accuracy]'")
         return 2
     say("integrating the orbit and placing the stations")
     passes = landsat_passes()
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # for the processes to come: one each is enough
-    with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
+    with worker_pool() as pool:
         found = losses(pool, passes)
         perigees = len(passes) // len(PERIGEES_DEG)
         worst = sensitivity(pool, passes[:perigees] + passes[2 * perigees : 3 * perigees])
     if chosen.plots:
-        chosen.plots.mkdir(parents=True, exist_ok=True)
         plot_losses(chosen.plots / "seed-001-losses.png", found)
         plot_sensitivity(chosen.plots / "seed-001-sensitivity.png", worst)
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_script(main)

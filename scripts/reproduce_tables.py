@@ -13,10 +13,7 @@ Errors are eps = sqrt(dA^2 + dh^2) without cos h, the largest over the predicted
 
 import argparse
 import json
-import multiprocessing
-import os
-import sys
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -26,13 +23,16 @@ from tables.charts import plot_figures_5, plot_rows
 from tables.console import progress, say
 from tables.errors_put_in import draw_errors
 from tables.methods import IN_TABLE, METHODS
+from tables.outputs import output_file, output_folder, output_picture
 from tables.rows import Row, rows_of, table_text
 from tables.seed_figures import PASSES, PRINTED_PASS_8, SeedPass
 from tables.simulate import errors_over_time_deg, largest_errors_deg
 from tables.true_pass import TruePass, true_passes
+from tables.workers import run_script, worker_pool
 
 CHUNK = 5  # runs that a process does at once
 SEED = 1990
+FEWEST_RUNS = 20  # for 5 and 95 %
 FIGURE_USED_S = 210  # seed 002, figures 5.2-5.7 show a loss in the pass 2 asc. over Alcantara
 
 
@@ -50,8 +50,7 @@ def simulate_chunk(
 
 def reproduce(passes: tuple[SeedPass, ...], methods: tuple[str, ...], run_count: int, seed: int) -> list[Row]:
     """Simulate every pass and give the rows, in the papers' order."""
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # for the processes to come: one each is enough
-    with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
+    with worker_pool() as pool:
         orbits = dict.fromkeys(one.orbit for one in passes)
         groups = [tuple(one for one in passes if one.orbit == orbit) for orbit in orbits]
         say(f"integrating {len(orbits)} reference orbits")
@@ -82,9 +81,9 @@ def options() -> argparse.Namespace:
     parser.add_argument("--methods", default=",".join(IN_TABLE), help=f"of {', '.join(METHODS)}")
     parser.add_argument("--only", default="", help="passes whose station and name hold this")
     parser.add_argument("--pass-8-as-printed", action="store_true", help="the printed elements for pass 8")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows as JSON")
-    parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the rows (PNG)")
-    parser.add_argument("--figures", type=Path, metavar="DIR", help="draw figures 5.2-5.7 of seed 002 there")
+    parser.add_argument("--json", type=output_file, metavar="FILE", help="write the rows as JSON")
+    parser.add_argument("--plot", type=output_picture, metavar="FILE", help="draw the rows (PNG)")
+    parser.add_argument("--figures", type=output_folder, metavar="DIR", help="draw figures 5.2-5.7 of seed 002 there")
     chosen = parser.parse_args()
     chosen.methods = tuple(chosen.methods.split(","))
     unknown = [name for name in chosen.methods if name not in METHODS]
@@ -92,6 +91,8 @@ def options() -> argparse.Namespace:
         parser.error(f"no method {unknown[0]!r}: expected some of {', '.join(METHODS)}")
     if chosen.runs < 1:
         parser.error("--runs must be 1 or more")
+    if chosen.seed < 0:
+        parser.error("--seed must be 0 or more")
     return chosen
 
 
@@ -110,6 +111,8 @@ def main() -> int:
         return 2
     rows = reproduce(passes, chosen.methods, chosen.runs, chosen.seed)
     print(table_text(rows, chosen.methods))
+    if chosen.runs < FEWEST_RUNS:
+        say(f"5-95 % of {chosen.runs} runs is too narrow: what ! marks means little below {FEWEST_RUNS} runs")
     if chosen.json:
         chosen.json.write_text(json.dumps({"rows": [row.as_json() for row in rows]}, indent=1) + "\n")
     if chosen.plot:
@@ -119,7 +122,6 @@ def main() -> int:
 
 def draw_figures(folder: Path, run_count: int, seed: int) -> None:
     """Errors over time of the pass that the papers show: both their methods."""
-    folder.mkdir(parents=True, exist_ok=True)
     (true_pass,) = true_passes(PASSES[:1])
     runs = np.random.SeedSequence(seed).spawn(run_count)
     curves: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {"deterministic": [], "kalman": []}
@@ -132,4 +134,4 @@ def draw_figures(folder: Path, run_count: int, seed: int) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_script(main)

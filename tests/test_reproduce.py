@@ -1,6 +1,8 @@
 """The reproduction of the papers' tables: reference orbit, errors put in, and one row of the table."""
 
 import json
+import os
+import signal
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -131,8 +133,54 @@ def test_the_command_writes_the_rows_as_json(tmp_path: Path) -> None:
     assert "[####" in done.stderr
 
 
-def test_the_command_says_which_methods_there_are() -> None:
-    command = [sys.executable, str(SCRIPT), "--methods", "oracle"]
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--methods", "oracle"), "no method 'oracle'"),
+        (("--seed", "-1"), "--seed must be 0 or more"),
+        (("--json", "DIR"), "DIR is a directory; give a file's name"),
+        (("--json", "DIR/no/rows.json"), "DIR/no/rows.json: there is no directory DIR/no; make it first"),
+        (("--plot", "DIR/rows.abc"), "DIR/rows.abc: expected a name that ends in .png, .svg, .pdf or the like"),
+        (("--plot", "DIR/no/rows.png"), "there is no directory DIR/no; make it first"),
+        (("--figures", "DIR/file/figures"), "DIR/file/figures cannot be made a directory: Not a directory"),
+    ],
+)
+def test_what_the_command_cannot_do_is_told_before_it_computes(
+    tmp_path: Path, arguments: tuple[str, ...], said: str
+) -> None:
+    (tmp_path / "file").touch()
+    command = [sys.executable, str(SCRIPT), *(text.replace("DIR", str(tmp_path)) for text in arguments)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert "no method 'oracle'" in done.stderr
+    assert said in done.stderr.replace(str(tmp_path), "DIR")
+
+
+INTERRUPTIBLE = """
+import time
+from tables.workers import run_script, worker_pool
+
+def main():
+    with worker_pool() as pool:
+        work = [pool.submit(time.sleep, 60.0) for _ in range(9)]
+        print("begun", flush=True)
+        return work[0].result() or 0
+
+run_script(main)
+"""
+
+
+def test_ctrl_c_ends_a_computation_with_all_its_processes_and_one_line() -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", INTERRUPTIBLE],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(SCRIPT.parent)},
+        start_new_session=True,
+    )
+    with process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "begun\n"
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does
+        _, said = process.communicate(timeout=30.0)
+    assert (process.returncode, said) == (130, "interrupted\n")
