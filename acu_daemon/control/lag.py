@@ -8,7 +8,7 @@ field's complaint: "the antenna always lags").
 """
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from math import exp
 
 MAX_LAG_S = 0.5
@@ -42,17 +42,22 @@ class LagEstimate:
 
         phase_s: from the moment a command takes effect to the sample of the angles; period_s: between commands.
         """
-        if self.sum_ss_deg2 <= 0.0:
-            return PRIOR_LAG_S
-        g = self.sum_sx_deg2 / self.sum_ss_deg2
-        noise_deg2 = max(self.sum_xx_deg2 - g * self.sum_sx_deg2, 0.0) / self.count + CODE_SIGMA_DEG**2
-        weight = self.sum_ss_deg2 / noise_deg2
+        return _most_likely_lag_s(self, phase_s, period_s)
 
-        def misfit(candidate: tuple[float, float]) -> float:
-            lag_s, shortfall = candidate
-            return weight * (shortfall - g) ** 2 + ((lag_s - PRIOR_LAG_S) / PRIOR_SIGMA_S) ** 2
 
-        return min(_candidates(phase_s, period_s), key=misfit)[0]
+@lru_cache(maxsize=8)  # asked several times a tick, for two axes
+def _most_likely_lag_s(seen: LagEstimate, phase_s: float, period_s: float) -> float:
+    if seen.sum_ss_deg2 <= 0.0:
+        return PRIOR_LAG_S
+    g = seen.sum_sx_deg2 / seen.sum_ss_deg2
+    noise_deg2 = max(seen.sum_xx_deg2 - g * seen.sum_sx_deg2, 0.0) / seen.count + CODE_SIGMA_DEG**2
+    weight = seen.sum_ss_deg2 / noise_deg2
+
+    def misfit(candidate: tuple[float, float]) -> float:
+        lag_s, shortfall = candidate
+        return weight * (shortfall - g) ** 2 + ((lag_s - PRIOR_LAG_S) / PRIOR_SIGMA_S) ** 2
+
+    return min(_candidates(phase_s, period_s), key=misfit)[0]
 
 
 @cache

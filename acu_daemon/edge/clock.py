@@ -41,35 +41,43 @@ class Clock(Protocol):
 
 
 class Timerfd:
-    """A Linux timerfd on CLOCK_MONOTONIC: asyncio's own timer is 0.6 ms late by construction.  One waiter at a time."""
+    """A Linux timerfd on CLOCK_MONOTONIC: asyncio's own timer is 0.6 ms late by construction.
+
+    One waiter at a time, in one loop.
+    """
 
     def __init__(self) -> None:
         self._fd = _LIBC.timerfd_create(time.CLOCK_MONOTONIC, _NONBLOCK_CLOEXEC)
         if self._fd < 0:
             raise OSError(ctypes.get_errno(), "timerfd_create failed")
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._woken: asyncio.Future[None] | None = None
 
     async def sleep_until(self, monotonic_s: float) -> None:
         """Return at that reading of CLOCK_MONOTONIC, at once if it has passed."""
         if monotonic_s <= time.monotonic():
             await asyncio.sleep(0)
             return
-        loop = asyncio.get_running_loop()
-        woken: asyncio.Future[None] = loop.create_future()
+        if self._loop is None:
+            self._loop = asyncio.get_running_loop()
+            self._loop.add_reader(self._fd, self._wake)
+        self._woken = self._loop.create_future()
         spec = (ctypes.c_long * 4)(0, 0, *divmod(math.ceil(monotonic_s * 1e9), 1_000_000_000))  # never early
         if _LIBC.timerfd_settime(self._fd, _TIMER_ABSOLUTE, ctypes.byref(spec), None) != 0:
             raise OSError(ctypes.get_errno(), "timerfd_settime failed")
-        loop.add_reader(self._fd, self._wake, woken)
-        try:
-            await woken
-        finally:
-            loop.remove_reader(self._fd)
+        await self._woken
 
-    def _wake(self, woken: asyncio.Future[None]) -> None:
-        os.read(self._fd, 8)
-        if not woken.done():
-            woken.set_result(None)
+    def _wake(self) -> None:
+        try:
+            os.read(self._fd, 8)
+        except BlockingIOError:  # set anew since it rang
+            return
+        if self._woken is not None and not self._woken.done():
+            self._woken.set_result(None)
 
     def close(self) -> None:
+        if self._loop is not None and not self._loop.is_closed():
+            self._loop.remove_reader(self._fd)
         os.close(self._fd)
 
 
