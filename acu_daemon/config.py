@@ -6,7 +6,7 @@ Unknown keys, wrong units and impossible values stop the start with file, key, v
 import tomllib
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
@@ -282,8 +282,20 @@ def _parse(model: type[File], path: Path, values: dict[str, Any], under: str = "
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        problems = [f"{path}: {in_words(dict(item), under)}" for item in error.errors()]
+        known = {"station.toml": _keys(StationFile), "the satellite's file": _keys(SatelliteFile)}
+        problems = [f"{path}: {in_words(dict(item), under, known)}" for item in error.errors()]
         raise ConfigError("\n".join(problems)) from None
+
+
+def _keys(model: type[Section], table: str = "") -> dict[str, set[str]]:
+    """The keys of a kind of file, by table."""
+    found = {table: set(model.model_fields)}
+    for name, field in model.model_fields.items():
+        for kind in (field.annotation, *get_args(field.annotation)):
+            if isinstance(kind, type) and issubclass(kind, Section):
+                for under, keys in _keys(kind, f"{table}.{name}".lstrip(".")).items():
+                    found.setdefault(under, set()).update(keys)
+    return found
 
 
 def control_config(station: StationFile, satellite: SatelliteFile, byte_time_s: float) -> ControlConfig:

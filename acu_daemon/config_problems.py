@@ -3,10 +3,14 @@
 import json
 from collections.abc import Mapping
 from datetime import date, time
+from difflib import get_close_matches
 from typing import Any
 
 KINDS = ("tle", "omm", "oem", "brouwer")
 LONGEST_VALUE = 60
+
+Keys = Mapping[str, Mapping[str, set[str]]]  # of every kind of file, by table; "": the top
+_NO_KEYS: Keys = {}
 
 _EXPECTED = {
     "float_type": "a number",
@@ -29,10 +33,10 @@ _EXPECTED = {
 }
 
 
-def in_words(item: Mapping[str, Any], under: str = "") -> str:
+def in_words(item: Mapping[str, Any], under: str = "", known: Keys = _NO_KEYS) -> str:
     """Put one validation error, as pydantic's `errors()` lists it, into one line.
 
-    under: the table that was validated, where it was not the whole file.
+    under: the table that was validated, where it was not the whole file.  known: what an unknown key may stand for.
     """
     key = _key(item["loc"], under)
     kind, value = item["type"], item["input"]
@@ -40,7 +44,7 @@ def in_words(item: Mapping[str, Any], under: str = "") -> str:
     if kind == "missing":
         return f"{key} is missing; it has no default"
     if kind == "extra_forbidden":
-        return f"{key}{_assigned(value)}: unknown key; is it misspelt, or in the wrong table?"
+        return f"{key}{_assigned(value)}: unknown key; {_guess(key, known)}"
     if kind == "union_tag_not_found":
         return f"{key}.kind is missing; expected one of {', '.join(KINDS)}"
     if kind == "union_tag_invalid":
@@ -50,6 +54,21 @@ def in_words(item: Mapping[str, Any], under: str = "") -> str:
         return f"{key}.{reason}" if isinstance(value, dict) else f"{key}{_assigned(value)}: {reason}"
     reason = f"expected {_EXPECTED[kind].format(**context)}" if kind in _EXPECTED else item["msg"]
     return f"{key}{_assigned(value)}: {reason}"
+
+
+def _guess(key: str, known: Keys) -> str:
+    """What was meant: a key of the same table that is written alike, else one of another table with that name."""
+    table, _, name = key.rpartition(".")
+    here = {other for tables in known.values() for other in tables.get(table, ())} - {name}
+    if near := get_close_matches(name, sorted(here), 1):
+        return f"did you mean {near[0]}?"
+    places = [
+        f"[{other}] of {file}" if other else file
+        for file, tables in known.items()
+        for other, names in tables.items()
+        if name in names and (other != table or not table)  # a table at the top is another file's
+    ]
+    return f"it belongs to {' or '.join(places)}" if places else "is it misspelt, or in the wrong table?"
 
 
 def _key(loc: tuple[str | int, ...], under: str) -> str:

@@ -93,6 +93,18 @@ def test_a_satellite_needs_its_name_and_elements(tmp_path: Path, key: str) -> No
 AZIMUTH_MIN = "min_deg = -270.0"
 LATITUDE = "latitude_deg = -15.53"
 STATION_MISTAKES = [
+    (
+        LATITUDE,
+        f"{LATITUDE}\nmin_elevation = 5",
+        "station.min_elevation = 5: unknown key; did you mean min_elevation_deg?",
+    ),
+    (
+        LATITUDE,
+        f"{LATITUDE}\nbeamwidth_deg = 1",
+        "station.beamwidth_deg = 1: unknown key; it belongs to [receiver] of sta",
+    ),
+    ("[station]", "[uncertainty]\n[station]", "uncertainty: unknown key; it belongs to the satellite's file"),
+    ("[station]", "[reading]\n[station]", "reading: unknown key; did you mean readings?"),
     (LATITUDE, "lattitude_deg = -15.53", "station.latitude_deg is missing; it has no default"),
     (LATITUDE, f"{LATITUDE}\nlat = 1.5", "station.lat = 1.5: unknown key; is it misspelt, or in the wrong table?"),
     (LATITUDE, 'latitude_deg = "15 S"', 'station.latitude_deg = "15 S": expected a number'),
@@ -173,8 +185,12 @@ def test_a_mistake_in_a_satellites_file_is_told_alike(tmp_path: Path, old: str, 
             "elements.limits.min_semi_major_axis_km = 42000: expected less than max_semi_major_axis_km = 8500",
         ),
         ("[elements.limits]\nmax_eccentricity = 1", "elements.limits.max_eccentricity = 1: expected less than 1"),
-        ("[station]\nheight_m = 1", "station: unknown key"),
-        ('[tracking]\nestimater = "full"', 'tracking.estimater = "full": unknown key'),
+        ("[station]\nheight_m = 1", "station: unknown key; it belongs to station.toml"),
+        (
+            "[readings]\nuncertainty_m = 1",
+            "readings.uncertainty_m = 1: unknown key; it belongs to [station] of station.toml",
+        ),
+        ('[tracking]\nestimater = "full"', 'tracking.estimater = "full": unknown key; did you mean estimator?'),
         ("[tracking]\nlow_water_s = 90", "tracking.low_water_s = 90: expected less than horizon_s = 90"),
         ("[readings]\nsigma_azimuth_deg = inf", "readings.sigma_azimuth_deg = inf: expected a finite number"),
         ('[receiver]\nbeamwidth_deg = "1"', 'receiver.beamwidth_deg = "1": expected a number'),
