@@ -213,8 +213,8 @@ class BrouwerSection(Section):
 
 
 class UncertaintySection(Section):
-    position_km: Positive | None = None
-    velocity_m_s: Positive | None = None
+    position_km: float | None = Field(default=None, gt=0, le=300)  # a fit from much more may end on no orbit at all
+    velocity_m_s: float | None = Field(default=None, gt=0, le=300)
 
 
 class FallbackSection(Section):

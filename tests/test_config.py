@@ -179,6 +179,8 @@ def test_a_mistake_in_a_satellites_file_is_told_alike(tmp_path: Path, old: str, 
     ("table", "said"),
     [
         ("[uncertainty]\nposition_km = 0", "uncertainty.position_km = 0: expected more than 0"),
+        ("[uncertainty]\nposition_km = 1000", "uncertainty.position_km = 1000: expected at most 300"),
+        ("[uncertainty]\nvelocity_m_s = 1000", "uncertainty.velocity_m_s = 1000: expected at most 300"),
         ("[fallback]\nhold = 3", "fallback.hold = 3: unknown key"),
         (
             "[elements.limits]\nmin_semi_major_axis_km = 42000",

@@ -128,3 +128,10 @@ def test_a_leap_second_between_epoch_and_now_moves_nothing() -> None:
     midnight_tai_s = tai_from_utc("2017-01-01T00:00:00Z")
     r_m, v_m_s = propagator.states_teme(midnight_tai_s + np.array([-1.5, -0.5, 0.5]))
     assert np.linalg.norm(np.diff(r_m, axis=0), axis=1) == pytest.approx(np.linalg.norm(v_m_s[1]), rel=1e-4)
+
+
+def test_a_correction_to_no_orbit_blames_the_readings_and_not_the_elements() -> None:
+    source = Sgp4Propagator(next(one for one in vallado_sets() if one.norad_id == 28057))
+    gone = source.corrected(Correction(delta_e_cos_argp=2.0))
+    with pytest.raises(OrbitError, match=r"SGP4 error 1\); so far do the readings correct the elements"):
+        gone.states_teme(np.array([source.epoch_tai_s]))

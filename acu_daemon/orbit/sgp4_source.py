@@ -47,7 +47,7 @@ class Sgp4Propagator:
         codes, r_km, v_km_s = self._satrec.sgp4_array(day, fraction)
         if codes.any() or not np.isfinite(r_km).all():
             bad = int(np.argmax((codes != 0) | ~np.isfinite(r_km).all(axis=1)))
-            raise OrbitError(_refusal(self.elements, float(tai_s[bad]), int(codes[bad])))
+            raise OrbitError(_refusal(self, float(tai_s[bad]), int(codes[bad])))
         return r_km * 1e3, v_km_s * 1e3
 
     def corrected(self, correction: Correction) -> "Sgp4Propagator":
@@ -80,10 +80,14 @@ def _satrec(elements: ElementSet, correction: Correction) -> Any:
     return satrec
 
 
-def _refusal(elements: ElementSet, tai_s: float, code: int) -> str:
+def _refusal(source: Sgp4Propagator, tai_s: float, code: int) -> str:
+    elements = source.elements
     reason = "the satellite has decayed" if code == _DECAYED else SGP4_ERRORS.get(code, "the position is not finite")
     age_days = (tai_s - elements.epoch_tai_s) / DAY_S
+    advice = "use newer elements"
+    if code != _DECAYED and source.correction != Correction():
+        advice = "so far do the readings correct the elements: are they this satellite's, and is [uncertainty] too wide?"
     return (
         f"{elements.label}: no position at {utc_text(tai_s)}, {age_days:.1f} days after the epoch of the elements: "
-        f"{reason} (SGP4 error {code}); use newer elements"
+        f"{reason} (SGP4 error {code}); {advice}"
     )
