@@ -175,6 +175,14 @@ def test_a_loss_with_a_fit_is_held_on_the_fit_and_without_one_on_the_elements() 
     assert step(TrackState.AUTOTRACK_TLE, lost)[0].track is TrackState.HOLD_TLE
 
 
+@pytest.mark.parametrize(("has_locked", "track"), [(False, TrackState.SEARCH), (True, TrackState.HOLD_TLE)])
+def test_a_signal_that_was_never_locked_is_searched_for_after_acquire_s(has_locked: bool, track: TrackState) -> None:
+    lost = status(AcuMode.REMOTE_BACKUP, is_acquired=False)
+    since_tai_s = NOW - CONFIG.acquire_s - 1.0
+    state = replace(ready(TrackState.HOLD_TLE, lost), has_locked=has_locked, hold_from_tai_s=since_tai_s)
+    assert tick(state, saw(lost), SKY, NOW, CONFIG)[0].track is track
+
+
 def test_silence_of_the_link_makes_everything_start_anew() -> None:
     seen = status()
     state, orders = tick(

@@ -81,6 +81,7 @@ def _absorb_reading(state: ControlState, status: Status, reading: Reading, confi
         az_deg=az_deg,
         track_of_readings=(*state.track_of_readings[1 - RATE_READINGS :], (reading.tai_s, az_deg, status.el_deg)),
         acquired_since_tai_s=since,
+        has_locked=state.has_locked or (since is not None and reading.tai_s - since >= config.lock_dwell_s),
         has_acquired=state.has_acquired or since is not None,
         is_stow_kept=_is_stow_kept(state, status),
     )

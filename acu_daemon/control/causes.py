@@ -147,7 +147,9 @@ def _of_time(state: ControlState, sky: Sky, now_tai_s: float, config: ControlCon
         waiting_s = now_tai_s - max(state.entered_tai_s, sky.plan.rise_tai_s)
         if waiting_s > config.acquire_s:
             causes.add(Cause.ACQUIRE_OVER)
-    if state.track in HOLDING and now_tai_s - state.hold_from_tai_s > config.hold_s:
+    is_glimpse = state.track is TrackState.HOLD_TLE and not state.has_locked  # it has shown nothing worth a long hold
+    hold_s = min(config.hold_s, config.acquire_s) if is_glimpse else config.hold_s
+    if state.track in HOLDING and now_tai_s - state.hold_from_tai_s > hold_s:
         causes.add(Cause.HOLD_OVER)
     if state.track is TrackState.SEARCH and in_state_s > config.search_s:
         causes.add(Cause.SEARCH_OVER)

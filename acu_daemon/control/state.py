@@ -90,6 +90,7 @@ class ControlState:
     az_deg: float = 0.0  # encoder azimuth of the newest status, in the frame of the wrap (continuous)
     track_of_readings: tuple[tuple[float, float, float], ...] = ()  # the newest: time, continuous azimuth, elevation
     acquired_since_tai_s: float | None = None
+    has_locked: bool = False  # acquired for the dwell time, once at least
     has_acquired: bool = False
     is_stow_kept: bool = False  # somebody stowed the antenna while we looked on: it stays, also after a lost link
     hold_from_tai_s: float = -inf

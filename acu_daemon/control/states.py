@@ -104,7 +104,7 @@ TABLE: tuple[Row, ...] = (
     Row(frozenset({S.AUTOTRACK_TLE}), Cause.FIT, S.AUTOTRACK_FITTED, "lock_dwell_s and the first fit"),
     Row(frozenset({S.HOLD_FITTED}), Cause.ACQUIRED, S.AUTOTRACK_FITTED),
     Row(frozenset({S.HOLD_TLE}), Cause.FIT, S.HOLD_FITTED, "a fit that ends just after the loss"),
-    Row(HOLDING, Cause.HOLD_OVER, S.SEARCH, "hold_s after 3 sigma left the beam, else after the loss"),
+    Row(HOLDING, Cause.HOLD_OVER, S.SEARCH, "hold_s after 3 sigma left the beam, or the loss; never locked: acquire_s"),
     Row(frozenset({S.SEARCH}), Cause.SEARCH_OVER, S.HOLD_TLE, "search_s"),
 )
 
