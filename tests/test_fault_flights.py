@@ -3,6 +3,9 @@
 The signal is lost at 11 s and comes back at 24 s; most faults come between, where only the daemon holds the antenna.
 """
 
+import re
+from pathlib import Path
+
 import pytest
 from fault_flights import CASES, FAULT_S, ON_PATH_DEG, T, flown, measure
 from flights import commands_between, events_named, rows_between, seconds_to_state
@@ -74,3 +77,9 @@ def test_every_verb_of_the_vocabulary_is_flown() -> None:
 def test_what_xor_cannot_see_is_doubted_and_said_once_a_second_at_most() -> None:
     times = [event["count"] for event in events_named(flown("xor-blind"), "acu.doubted")]
     assert 1 <= len(times) <= 4
+
+
+def test_the_table_of_the_docs_has_a_line_for_every_flight() -> None:
+    lines = (Path(__file__).resolve().parents[1] / "docs" / "reliability.md").read_text().splitlines()
+    told = [line.split("|")[-2].strip() for line in lines if re.search(r"\| \d+\.\d\d \| \d+\.\d \|", line)]
+    assert sorted(told) == sorted(CASES)
