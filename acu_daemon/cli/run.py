@@ -9,6 +9,7 @@ import os
 import sys
 import time
 from dataclasses import asdict, replace
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -42,6 +43,7 @@ from acu_daemon.edge.fit import ProcessFitRunner
 from acu_daemon.edge.link import Link, check_rate, make_link
 from acu_daemon.edge.logs import configure_logs, tell_dropped
 from acu_daemon.edge.recording import RecordingWriter
+from acu_daemon.edge.scheduling import keep_to_this_thread, scheduling_text
 from acu_daemon.edge.state import SnapshotFile, state_directory
 from acu_daemon.edge.systemd import Notifier
 from acu_daemon.edge.writer import QueuedStream, Writer
@@ -50,6 +52,13 @@ from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.protocol.sa3842 import address_byte
 
 STDERR = 2
+
+
+class LogLevel(StrEnum):
+    """How much the log says."""
+
+    INFO = "info"
+    DEBUG = "debug"
 
 
 def command(
@@ -70,6 +79,9 @@ def command(
             "--state", metavar="DIR", help="Where state is kept.  Default: $STATE_DIRECTORY, else the XDG state home."
         ),
     ] = None,
+    log_level: Annotated[
+        LogLevel, typer.Option("--log-level", help="debug: also a line for each tick and each fit.")
+    ] = LogLevel.INFO,
     shadow: Annotated[
         bool,
         typer.Option("--shadow", help="Command nothing: poll, fit, predict and record while somebody else steers."),
@@ -85,6 +97,7 @@ def command(
     os.umask(0o027)  # what is left belongs to this user and its group
     if not faulthandler.is_enabled():
         faulthandler.enable(STDERR)  # the service's watchdog ends a hung daemon by SIGABRT: say where it hung
+    keep_to_this_thread()
     check_duration(duration)
     clock = make_clock(at, at_monotonic)
     target = load_target(config, satellite, clock.tai_s())
@@ -102,6 +115,7 @@ def command(
             clock.tai_s,
             tags={"REHEARSAL": True} if clock.is_rehearsal else {},
             is_terminal=sys.stdout is not None and sys.stdout.isatty(),
+            is_debug=log_level is LogLevel.DEBUG,
             before_line=live.clear if live else None,
             writer=output,
         )
@@ -166,6 +180,7 @@ def _announce(target: Target, coming: Pass, clock: SystemClock, *, is_shadow: bo
         rise=utc_text(coming.rise_tai_s, 0),
         set=utc_text(coming.set_tai_s, 0),
         culmination_deg=round(coming.culmination_el_deg, 1),
+        scheduling=scheduling_text(),
     )
     for warning in target.elements.warnings:
         log.warning("elements.warning", reason=warning)

@@ -1,6 +1,7 @@
 """SIMULATION: a whole pass in virtual time: the real daemon against the fake ACU, minutes in seconds, bit for bit."""
 
 import asyncio
+import logging
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -147,7 +148,11 @@ def _events_to(events: list[dict[str, Any]]) -> Iterator[None]:
         events.append(dict(entry))
         raise structlog.DropEvent
 
-    structlog.configure(processors=[gather], cache_logger_on_first_use=False)
+    structlog.configure(
+        processors=[gather],
+        wrapper_class=structlog.make_filtering_bound_logger(logging.INFO),
+        cache_logger_on_first_use=False,
+    )
     try:
         yield
     finally:

@@ -65,6 +65,9 @@ class Snapshot:
     link_problem: str
     is_rehearsal: bool
     is_simulation: bool
+    lateness_p50_ms: float = 0.0  # of the newest ticks
+    lateness_p99_ms: float = 0.0
+    lateness_max_ms: float = 0.0
     answered_count: int = 0  # ordered exchanges that the ACU answered
     attempt_count: int = 0  # to open the link
     model: str = ""  # what the prediction is made from

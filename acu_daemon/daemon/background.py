@@ -115,6 +115,8 @@ class Background:
             self._predict_here(self._clock.tai_s())
             return
         self._died_count = 0
+        took_ms = 1e3 * (self._clock.tai_s() - now_tai_s)
+        self._log.debug("fit.done", readings=len(request.readings), took_ms=took_ms, fit=reply.fit)
         self._take(reply, has_readings=len(request.readings) > 0)
 
     def _pause_s(self, *, has_died: bool) -> float:

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import structlog
 
 from acu_daemon.assist.gate import Dwell
@@ -16,6 +15,7 @@ from acu_daemon.control.states import AUTOTRACKING
 from acu_daemon.control.tick import tick
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.clock_watch import ClockWatch
+from acu_daemon.daemon.lateness import Lateness
 from acu_daemon.daemon.line_watch import LineWatch
 from acu_daemon.daemon.port import AcuPort, Answer
 from acu_daemon.daemon.stopping import stop_antenna
@@ -39,7 +39,6 @@ from acu_daemon.protocol.messages import (
 
 DOUBT_EVERY_S = 1.0
 HURRY_SHARE = 0.9  # of the period: the next tick comes on time
-LATENESS_KEPT = 36000  # an hour of ticks
 
 
 class Foreground:
@@ -74,12 +73,7 @@ class Foreground:
         self.skipped_tick_count = 0
         self.line_watch = LineWatch(port, self._doubt)
         self.clock_watch = ClockWatch(clock, config.clock_alarm_deg)
-        self._lateness_s = np.zeros(LATENESS_KEPT)
-
-    @property
-    def lateness_s(self) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Lateness of the newest ticks, seconds, unordered."""
-        return self._lateness_s[: min(self.tick_count, LATENESS_KEPT)]
+        self.lateness = Lateness()
 
     async def run(self) -> None:
         """Tick at the tenths of UTC seconds; a late tick is counted and skipped, never sent in a burst."""
@@ -87,7 +81,8 @@ class Foreground:
         due_tai_s = math.ceil(self._clock.tai_s() / period_s + 1) * period_s
         while True:
             await self._clock.sleep_until(due_tai_s)
-            self._lateness_s[self.tick_count % LATENESS_KEPT] = self._clock.tai_s() - due_tai_s
+            late_s = self._clock.tai_s() - due_tai_s
+            self.lateness.add(late_s)
             self.tick_count += 1
             await self._tick()
             await self._hurry(due_tai_s)
@@ -98,6 +93,7 @@ class Foreground:
             missed = max(0, math.floor((self._clock.tai_s() - due_tai_s) / period_s))
             self.skipped_tick_count += missed
             due_tai_s = round(due_tai_s / period_s + 1 + missed) * period_s
+            self._log.debug("tick", late_ms=1e3 * late_s, skipped=missed, status=self._area.state.status)
 
     async def _hurry(self, due_tai_s: float) -> None:
         """While the start's exchanges are answered, the next one follows in the same tick if it fits."""

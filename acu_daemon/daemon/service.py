@@ -26,6 +26,7 @@ from acu_daemon.model import FitResult, Pass, Prediction, Reading, sky_angle_deg
 
 FIRST_POLL_S = 10.0  # no good poll within this of the start ends the run
 STOP_DEADLINE_S = 1.0
+LATENESS_TICKS = 100  # of the snapshot: the newest ten seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +66,7 @@ class Outcome:
     lag_el_s: float
     lateness_p50_ms: float
     lateness_p99_ms: float
+    lateness_max_ms: float
 
 
 class Service:
@@ -219,7 +221,7 @@ class Service:
             if point is not None:
                 miss_deg = sky_angle_deg(reading.az_deg, reading.el_deg, point.az_deg, point.el_deg)
         lag_az_s, lag_el_s = state.lag_s(self._job.control)
-        identity = self._foreground.identity
+        identity, lateness = self._foreground.identity, self._foreground.lateness.figures(LATENESS_TICKS)
         return Snapshot(
             tai_s=now_tai_s,
             state=str(state.track),
@@ -242,6 +244,9 @@ class Service:
             lag_el_s=lag_el_s,
             tick_count=self._foreground.tick_count,
             skipped_tick_count=self._foreground.skipped_tick_count,
+            lateness_p50_ms=lateness.p50_ms,
+            lateness_p99_ms=lateness.p99_ms,
+            lateness_max_ms=lateness.max_ms,
             write_count=self._foreground.write_count,
             answered_count=self._foreground.answered_count,
             attempt_count=self._port.attempt_count,
@@ -292,7 +297,7 @@ class Service:
 
     def _outcome(self, reason: str, is_stopped: bool) -> Outcome:
         state, foreground = self._area.state, self._foreground
-        lateness_ms = sorted(float(late_s) * 1e3 for late_s in foreground.lateness_s) or [0.0]
+        lateness = foreground.lateness.figures()
         lag_az_s, lag_el_s = state.lag_s(self._job.control)
         return Outcome(
             reason=reason,
@@ -309,8 +314,9 @@ class Service:
             connect_count=self._port.connect_count,
             lag_az_s=lag_az_s,
             lag_el_s=lag_el_s,
-            lateness_p50_ms=lateness_ms[len(lateness_ms) // 2],
-            lateness_p99_ms=lateness_ms[int(0.99 * (len(lateness_ms) - 1))],
+            lateness_p50_ms=lateness.p50_ms,
+            lateness_p99_ms=lateness.p99_ms,
+            lateness_max_ms=lateness.max_ms,
         )
 
 

@@ -19,13 +19,15 @@ def configure_logs(
     *,
     tags: dict[str, Any],
     is_terminal: bool,
+    is_debug: bool = False,
     before_line: Callable[[], None] | None = None,
     writer: Writer | None = None,
 ) -> None:
     """Set up the logs once.
 
-    now_tai_s stamps every line with the daemon's own UTC; tags (SIMULATION, REHEARSAL) stand on every line; before_line
-    clears the live line of a terminal first; writer prints the lines beside the loop.
+    now_tai_s stamps every line with the daemon's own UTC; tags (SIMULATION, REHEARSAL) stand on every line; is_debug
+    adds a line for each tick and fit; before_line clears the live line of a terminal first; writer prints the lines
+    beside the loop.
     """
 
     def stamp(_logger: Any, _name: str, entry: Entry) -> Entry:
@@ -39,7 +41,7 @@ def configure_logs(
     render: Any = readable if is_terminal else structlog.processors.JSONRenderer(default=str)
     structlog.configure(
         processors=[structlog.processors.add_log_level, stamp, render],
-        wrapper_class=structlog.make_filtering_bound_logger(logging.INFO),
+        wrapper_class=structlog.make_filtering_bound_logger(logging.DEBUG if is_debug else logging.INFO),
         logger_factory=_OutputFactory(writer),
         cache_logger_on_first_use=False,
     )
