@@ -143,9 +143,16 @@ class TrackingSection(Section):
 class SafetySection(Section):
     arm: Literal["auto", "manual"] = "auto"
     register_watchdog_s: float = Field(default=5.0, ge=0, le=600)  # the ACU's W; 0: it is not touched
-    following_error_deg: float = Field(default=1.0, gt=0, le=30)  # on the sky
+    following_error_deg: float = Field(default=1.0, ge=0.2, le=30)  # on the sky; less is lag, noise and wind
     following_error_s: float = Field(default=2.0, ge=0, le=60)  # 0: the axes are not watched
     clock_alarm_beam_fraction: float = Field(default=0.1, gt=0, le=10)
+
+    @model_validator(mode="after")
+    def _none_or_enough(self) -> "SafetySection":
+        for name, least_s in (("register_watchdog_s", 2.0), ("following_error_s", 0.5)):
+            if 0.0 < getattr(self, name) < least_s:
+                raise ValueError(f"{name} = {getattr(self, name):g}: expected 0 (off) or at least {least_s:g}")
+        return self
 
 
 class StationFile(Section):

@@ -133,6 +133,16 @@ STATION_MISTAKES = [
     ("[station]", "[tracking]\nestimator = 'best'\n[station]", "tracking.estimator = \"best\": expected 'circular',"),
     ("[station]", "[tracking]\nlow_water_s = 95.0\n[station]", "tracking.low_water_s = 95: expected less than horizon"),
     ("[station]", "[safety]\narm = true\n[station]", "safety.arm = true: expected 'auto' or 'manual'"),
+    (
+        "[station]",
+        "[safety]\nregister_watchdog_s = 1\n[station]",
+        "register_watchdog_s = 1: expected 0 (off) or at least 2",
+    ),
+    (
+        "[station]",
+        "[safety]\nfollowing_error_s = 0.1\n[station]",
+        "following_error_s = 0.1: expected 0 (off) or at least",
+    ),
     ("[station]", "[time]\nut1_utc_s = -1.5\n[station]", "time.ut1_utc_s = -1.5: expected at least -1"),
     ("[station]", "[receiver]\nbeamwidth_deg = 0\n[station]", "receiver.beamwidth_deg = 0: expected more than 0"),
     ("[station]", "[station", "not TOML: Expected ']' at the end of a table declaration (at line 2, column 9)"),

@@ -17,6 +17,8 @@ from acu_daemon.protocol.messages import (
     Backup,
     ClearChange,
     Command,
+    Identify,
+    Identity,
     Nak,
     Parameter,
     Poll,
@@ -136,6 +138,18 @@ def test_p6_the_latch_outlives_a_lost_link_and_whatever_the_acu_does() -> None:
         assert orders_of(sent) == []
         assert state.latch == LATCH
     assert state.track is TrackState.FAULT
+
+
+def test_p6_a_restart_with_a_latch_knows_the_acu_stops_the_antenna_once_and_moves_nothing() -> None:
+    state, sent, extra = ControlState(latch=LATCH, is_stop_due=True), [], None
+    for k in range(30):
+        state, orders = tick(state, saw(status(AcuMode.REMOTE), extra=extra), FITTED, NOW + 0.1 * k, GUARDED)
+        reply = Identity("3842", "S1") if isinstance(orders.extra, Identify) else Ack()
+        extra = Exchange(orders.extra, reply) if orders.extra is not None else None
+        sent += [orders.extra] if orders.extra is not None else []
+    assert sent[:2] == [Identify(), Stop()]
+    assert orders_of(sent) == [Stop()]
+    assert (state.track, state.latch) == (TrackState.FAULT, LATCH)
 
 
 def test_p6_only_a_person_clears_it_and_the_start_order_begins_anew() -> None:

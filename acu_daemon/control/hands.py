@@ -118,7 +118,7 @@ def _rates_deg_s(state: ControlState) -> tuple[float, float]:
 
 def last_command(state: ControlState, config: ControlConfig) -> Command | None:
     """What still goes out of a daemon that is latched or was disarmed: STOP, then the ACU's register watchdog off."""
-    if config.is_shadow:
+    if config.is_shadow or state.stage is Stage.NEW:  # a rehearsal must know first that the ACU is no real one
         return None
     if state.is_stop_due and state.status is not None and state.status.mode not in NO_STOP_MODES:
         return Stop()
