@@ -7,7 +7,7 @@ itself, or that shows an axis where no drive can have brought it, counts only wh
 from math import cos, radians
 
 from acu_daemon.model import AxisLimits
-from acu_daemon.protocol.messages import AcuMode, Status
+from acu_daemon.protocol.messages import AcuMode, Backup, Status
 from acu_daemon.units import wrap_180
 
 SLACK_DEG = 1.0  # on the sky: noise, and more is left to the gate of readings
@@ -26,7 +26,8 @@ def contradictions(status: Status) -> tuple[str, ...]:
     )
     found = {
         "mode and control": (mode is AcuMode.MANUAL) == status.is_remote_enabled and mode is not AcuMode.FAULT,
-        "mode and backup": (mode in BACKUP_MODES) != status.is_backup_active,
+        "mode and backup": (mode in BACKUP_MODES) != status.is_backup_active
+        or (mode in BACKUP_MODES and (mode is AcuMode.REMOTE_BACKUP) != (status.backup_selected is Backup.REMOTE)),
         "mode and autotrack": is_selected if mode in DESELECTED_MODES else not is_selected,
         "mode and fault": mode is AcuMode.FAULT and not has_fault,
         "mode and registers": status.are_registers_idle
