@@ -76,7 +76,10 @@ def command(
     state: Annotated[
         Path | None,
         typer.Option(
-            "--state", metavar="DIR", help="Where state is kept.  Default: $STATE_DIRECTORY, else the XDG state home."
+            "--state",
+            metavar="DIR",
+            help="Where state is kept, that of a rehearsal in DIR-rehearsal.  "
+            "Default: $STATE_DIRECTORY, else the XDG state home.",
         ),
     ] = None,
     log_level: Annotated[
