@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What a bad minute of readings does to the prediction, with the gate and without it: real passes, 0.03 deg noise.
 
-    .venv/bin/python scripts/gate_figures.py                    the tables (about three minutes)
+    .venv/bin/python scripts/gate_figures.py                    the table (some minutes)
     .venv/bin/python scripts/gate_figures.py --only hunting     the kinds with that word in their name
     .venv/bin/python scripts/gate_figures.py --first-locks      first locks on a side lobe, without AGC
 
@@ -158,8 +158,8 @@ def settings_of(kind: Kind, place: Place, at_tai_s: float) -> EstimatorSettings:
 
 
 def locks(readings: Readings, t: Array, dwell_s: float) -> tuple[Readings, Readings]:
-    """What the dwell leaves, and what came before it; in the bad minute the lock lasts 0.8 of every 2 s."""
-    is_locked = (t < 0.0) | (t >= BAD_S) | (t % 2.0 < 0.8)
+    """What the dwell leaves, and all while locked; the bad minute has no lock in the first of every two seconds."""
+    is_locked = (t < 0.0) | (t >= BAD_S) | (t % 2.0 >= 1.0)
     rows = zip(readings.tai_s.tolist(), readings.az_deg.tolist(), readings.el_deg.tolist(), is_locked, strict=True)
     seen = [Reading(t, az, el, bool(locked)) for t, az, el, locked in rows]
     return locked_readings(seen, Dwell(dwell_s)), readings.part(is_locked)
@@ -213,7 +213,7 @@ def measure(place: Place, kind: Kind, hz: float, seed: int) -> Figures:
         offered, acquired = locks(readings, t, kind.dwell_s)
         seen = acquired.part(acquired.tai_s <= end_tai_s)
         dwelt_count = len(seen) - int(np.count_nonzero(offered.tai_s <= end_tai_s))
-    reference = plain(place, readings.part(before))
+    reference = plain(place, offered.part(offered.tai_s < readings.tai_s[bad][0]))
     fit, counts = fitted(gated(place, offered.part(offered.tai_s <= end_tai_s), settings), place, end_tai_s)
     counts[DWELL] = dwelt_count
     bad_count = dwelt_count if kind.dwell_s else int(np.count_nonzero(bad))

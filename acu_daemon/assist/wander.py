@@ -1,7 +1,7 @@
 """Whether readings wander about their path: an axis that hunts, or a track that is drawn off it slowly.  Pure.
 
-White noise of any size averages out; what keeps its sign from reading to reading does not, and an orbit cannot follow
-it.  So the measure is the mean product of offsets that follow each other, against that of the readings believed.
+White noise of any size averages out; what comes back after a few readings does not, and an orbit cannot follow it.  So
+the measure is the mean product of offsets a few readings apart, against that of the readings believed.
 """
 
 from dataclasses import replace
@@ -16,6 +16,7 @@ from acu_daemon.model import Readings
 
 WINDOW_S, WINDOW_COUNT = 3.0, 8  # both at least
 BEFORE_S = 120.0
+LAGS = (1, 2, 3, 4)  # slow readings of a fast axis change their sign from one to the next
 FACTOR = 2.0  # of the noise squared, and of what the readings believed show
 REACH = 2.0  # times as far off as is near an axis may hunt
 TURNING_S, TURNING_SHARE = 20.0, 0.3  # so much of the wander is left without its trend: an axis that hunts
@@ -24,9 +25,9 @@ _NONE = Readings.of([])
 
 
 def wander_deg2(seen: Offsets) -> float:
-    """The mean product of offsets that follow each other: 0 for white noise, the mean square for what lasts."""
+    """The mean product of offsets some readings apart, the largest: 0 for white noise, or up to the mean square."""
     right, up = seen.right_deg, seen.up_deg
-    return float(right[1:] @ right[:-1] + up[1:] @ up[:-1]) / (right.size - 1)
+    return max(float(right[k:] @ right[:-k] + up[k:] @ up[:-k]) / (right.size - k) for k in LAGS)
 
 
 class Wander:
