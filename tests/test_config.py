@@ -136,12 +136,12 @@ STATION_MISTAKES = [
     (
         "[station]",
         "[safety]\nregister_watchdog_s = 1\n[station]",
-        "register_watchdog_s = 1: expected 0 (off) or at least 2",
+        "safety.register_watchdog_s = 1: expected 0 (off) or at least 2",
     ),
     (
         "[station]",
         "[safety]\nfollowing_error_s = 0.1\n[station]",
-        "following_error_s = 0.1: expected 0 (off) or at least",
+        "safety.following_error_s = 0.1: expected 0 (off) or at least",
     ),
     ("[station]", "[time]\nut1_utc_s = -1.5\n[station]", "time.ut1_utc_s = -1.5: expected at least -1"),
     ("[station]", "[receiver]\nbeamwidth_deg = 0\n[station]", "receiver.beamwidth_deg = 0: expected more than 0"),
