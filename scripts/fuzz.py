@@ -87,7 +87,7 @@ def scenario(data: bytes) -> None:
 def carry_over(data: bytes) -> None:
     path = SCRATCH / "carry.json"
     path.write_bytes(data)
-    read_carry_over(path)
+    read_carry_over(path, "DEMO-1 (99901)")
     for left in SCRATCH.glob("carry.json*"):
         left.unlink()
 

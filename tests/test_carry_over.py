@@ -3,6 +3,7 @@
 import asyncio
 import pickle
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -13,7 +14,15 @@ from made_orbits import circular, site, visible
 from real_passes import noisy, sky_angles_deg
 from script_modules import load
 
-from acu_daemon.assist.carry_over import LONGEST_S, CarryOver, aged_prior, carry_over_of, first_fit, why_not
+from acu_daemon.assist.carry_over import (
+    LONGEST_S,
+    CarryOver,
+    aged_prior,
+    carry_over_of,
+    first_fit,
+    why_not,
+    why_not_resume,
+)
 from acu_daemon.assist.encoder import encoder_look
 from acu_daemon.assist.estimator import ESTIMATORS, has_covariance
 from acu_daemon.assist.full import FullEstimator
@@ -188,7 +197,8 @@ def test_elements_that_differ_in_drag_alone_are_other_elements() -> None:
 """
     (elements,), _ = parse_tle(text, "test")
     source, other = (Sgp4Propagator(replace(elements, bstar_per_radius=b)) for b in (3.8792e-5, 5e-5))
-    fit = FitResult("full", Correction(), source.epoch_tai_s + DAY_S, 100, 0, 0.0, 0.0, 0.0, covariance=np.eye(13))
+    covariance = make_prior(source, SETTINGS, source.epoch_tai_s).covariance
+    fit = FitResult("full", Correction(), source.epoch_tai_s + DAY_S, 100, 0, 0.0, 0.0, 0.0, covariance=covariance)
     carried = carry_over_of(fit, source, WHERE)
     assert carried is not None
     assert why_not(carried, source, SETTINGS, carried.at_tai_s) == ""
@@ -201,6 +211,45 @@ def test_what_is_too_old_or_from_later_or_no_orbits_correction_is_dropped() -> N
     assert why_not(CARRIED, SOURCE, SETTINGS, at - 1.0) == "it is from a later time than now"
     wild = replace(CARRIED, correction=Correction(delta_raan_rad=1.0 * DEG))
     assert why_not(wild, SOURCE, SETTINGS, at) == "its correction is more than 5 sigma from the elements"
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            {"correction": Correction(delta_raan_rad=50.0 * DEG)},
+            "its correction is more than 5 sigma from the elements",
+        ),
+        ({"bias": AngleBias(az_deg=50.0)}, "its biases are more than 5 of the [readings] bias_sigma"),
+        ({"bias": AngleBias(el_deg=-0.6)}, "its biases are more than 5 of the [readings] bias_sigma"),
+        ({"station_shift_enu_m": (1e6, 0.0, 0.0)}, "its shift of the station is more than 5 times [station] uncert"),
+        ({"covariance": np.zeros((13, 13))}, "its covariance is not that of a fit"),
+        ({"covariance": 1e6 * CARRIED.covariance}, "its covariance is not that of a fit"),
+    ],
+)
+def test_what_no_fit_leaves_is_dropped_from_the_next_pass_and_from_a_resumed_one(
+    change: dict[str, Any], said: str
+) -> None:
+    settings = replace(SETTINGS, station_sigma_m=1000.0)
+    wild, at = replace(CARRIED, **change), CARRIED.at_tai_s
+    assert why_not(CARRIED, SOURCE, settings, at) == ""
+    assert why_not(wild, SOURCE, settings, at).startswith(said)
+    resume = partial(why_not_resume, source=SOURCE, site=WHERE, estimator="full", settings=settings, now_tai_s=at)
+    assert resume(CARRIED, has_covariance=True) == ""
+    assert resume(wild, has_covariance=True).startswith(said)
+
+
+def test_a_widened_fit_is_gone_on_from_in_its_own_pass_only() -> None:
+    far, at = replace(CARRIED, correction=Correction(delta_mean_anomaly_rad=6.0 * DEG)), CARRIED.at_tai_s
+    assert why_not(far, SOURCE, SETTINGS, at) == "its correction is more than 5 sigma from the elements"
+    assert why_not_resume(far, SOURCE, WHERE, "full", SETTINGS, at, has_covariance=True) == ""
+
+
+def test_what_the_configuration_holds_fixed_is_not_judged() -> None:
+    fixed = replace(SETTINGS, bias_sigma_azimuth_deg=0.0, bias_sigma_elevation_deg=0.0)
+    assert why_not(CARRIED, SOURCE, fixed, CARRIED.at_tai_s) == ""
+    start = first_fit(CARRIED, aged_prior(CARRIED, SOURCE, WHERE, fixed, CARRIED.at_tai_s))
+    assert (start.bias.az_deg, start.bias.el_deg) == (0.0, 0.0)
 
 
 def test_few_readings_or_no_covariance_leave_nothing() -> None:

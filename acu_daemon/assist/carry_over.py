@@ -5,13 +5,15 @@ where the next pass is seen by the same station.
 """
 
 from dataclasses import dataclass, field, replace
-from math import exp, hypot
+from math import exp, hypot, radians
 
 import numpy as np
 
 from acu_daemon.assist.full_states import (
+    BIAS,
     ORBIT,
     STATE_COUNT,
+    STATION,
     Prior,
     bias_of,
     correction_of,
@@ -20,6 +22,7 @@ from acu_daemon.assist.full_states import (
     states_of,
 )
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings, StateSigmas
+from acu_daemon.assist.widening import WIDTHS
 from acu_daemon.errors import OrbitError
 from acu_daemon.model import AngleBias, Correction, FitResult, Site, Station
 from acu_daemon.orbit.kepler import osculating_from_state
@@ -28,7 +31,7 @@ from acu_daemon.units import DAY_S, EARTH_EQUATORIAL_RADIUS_M, Array
 
 LEAST_READINGS = 30
 LONGEST_S = 10.0 * DAY_S  # after that, new elements' own uncertainty is as good
-WIDEST_SIGMAS = 5.0  # a correction beyond this many a-priori sigmas was no orbit's but another signal's
+WIDEST_SIGMAS = 5.0  # what is beyond this many a-priori sigmas was no orbit's, but another signal's or a damaged file's
 SAME_M, SAME_M_S = 1.0, 1e-3
 
 _MEAN_ANOMALY, _MEAN_MOTION = 1, 2
@@ -76,13 +79,27 @@ def resume_of(fit: FitResult, source: Propagator, site: Site) -> CarryOver | Non
     return replace(_of(fit, covariance, source, site), is_of_this_pass=True)
 
 
-def why_not_resume(carried: CarryOver, source: Propagator, site: Site, estimator: str, now_tai_s: float) -> str:
-    """Why a fit of this pass cannot be gone on from; empty where it can."""
-    if carried.at_tai_s > now_tai_s:
-        return "it is from a later time than now"
+def why_not_resume(
+    carried: CarryOver,
+    source: Propagator,
+    site: Site,
+    estimator: str,
+    settings: EstimatorSettings,
+    now_tai_s: float,
+    *,
+    has_covariance: bool,
+) -> str:
+    """Why a fit of this pass cannot be gone on from; empty where it can.  Its prior may have been widened."""
+    if not 0.0 <= now_tai_s - carried.at_tai_s <= LONGEST_S:
+        return "it is from a later time than now, or of long ago"
     if carried.station != site.station or carried.estimator != estimator:
         return "the station or the estimator has changed"
-    return "" if _has_same_elements(carried, source) else "the elements have changed"
+    if not _has_same_elements(carried, source):
+        return "the elements have changed"
+    sigma = _prior_sigma(carried, source, settings)
+    sigma[ORBIT] *= WIDTHS[-1].factor
+    sigma[_MEAN_ANOMALY] += radians(WIDTHS[-1].along_deg)
+    return _too_far(carried, sigma, has_covariance=has_covariance)
 
 
 def carry_over_of(fit: FitResult, source: Propagator, site: Site) -> CarryOver | None:
@@ -119,11 +136,7 @@ def why_not(carried: CarryOver, source: Propagator, settings: EstimatorSettings,
         return f"it is {age_s / DAY_S:.1f} days old, the limit is {LONGEST_S / DAY_S:g}"
     if not _has_same_elements(carried, source):
         return "the elements have changed"
-    sigma = np.sqrt(np.diag(make_prior(source, settings, carried.at_tai_s).covariance))[ORBIT]
-    off = np.abs(_mean(carried)[ORBIT])
-    if (off > WIDEST_SIGMAS * sigma).any():
-        return f"its correction is more than {WIDEST_SIGMAS:g} sigma from the elements"
-    return ""
+    return _too_far(carried, _prior_sigma(carried, source, settings), has_covariance=True)
 
 
 def aged_prior(
@@ -170,6 +183,28 @@ def first_fit(carried: CarryOver, prior: Prior) -> FitResult:
         station_shift_enu_m=shift_of(prior.mean),
         covariance=prior.covariance,
     )
+
+
+def _prior_sigma(carried: CarryOver, source: Propagator, settings: EstimatorSettings) -> Array:
+    """A-priori sigmas (13,); 0: no fit may change that state."""
+    sigma: Array = np.sqrt(np.diag(make_prior(source, settings, carried.at_tai_s).covariance))
+    return sigma
+
+
+def _too_far(carried: CarryOver, prior_sigma: Array, *, has_covariance: bool) -> str:
+    """Which states, or sigmas of states, no fit from a prior with these sigmas leaves; empty where there are none."""
+    limit = np.where(prior_sigma > 0.0, WIDEST_SIGMAS * prior_sigma, np.inf)
+    is_off = np.abs(_mean(carried)) > limit
+    if is_off[ORBIT].any():
+        return f"its correction is more than {WIDEST_SIGMAS:g} sigma from the elements"
+    if is_off[BIAS].any():
+        return f"its biases are more than {WIDEST_SIGMAS:g} of the [readings] bias_sigma"
+    if is_off[STATION].any():
+        return f"its shift of the station is more than {WIDEST_SIGMAS:g} times [station] uncertainty_m"
+    sigma = np.sqrt(np.diag(carried.covariance))
+    if has_covariance and ((sigma[ORBIT] == 0.0).any() or (sigma > limit).any()):
+        return "its covariance is not that of a fit"
+    return ""
 
 
 def _states(source: Propagator, at_tai_s: float) -> Array:

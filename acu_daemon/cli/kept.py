@@ -79,7 +79,15 @@ def _resumed(left: RunState, target: Target, now_tai_s: float) -> CarryOver | No
     if left.fit is None:
         return None
     station = target.station
-    reason = why_not_resume(left.fit, target.elements.propagator, station.site, station.tracking.estimator, now_tai_s)
+    reason = why_not_resume(
+        left.fit,
+        target.elements.propagator,
+        station.site,
+        station.tracking.estimator,
+        estimator_settings(station, target.satellite),
+        now_tai_s,
+        has_covariance=has_covariance(station.tracking.estimator),
+    )
     if reason:
         log.warning("run_state.dropped", reason=reason)
         return None
@@ -89,7 +97,9 @@ def _resumed(left: RunState, target: Target, now_tai_s: float) -> CarryOver | No
 
 def _carried(target: Target, path: Path, now_tai_s: float) -> CarryOver | None:
     """What the last pass of the satellite left, where it may be used."""
-    carried = read_carry_over(path) if has_covariance(target.station.tracking.estimator) else None
+    carried = (
+        read_carry_over(path, target.elements.label) if has_covariance(target.station.tracking.estimator) else None
+    )
     if carried is None:
         return None
     log: Any = structlog.get_logger("carry_over")

@@ -22,7 +22,7 @@ from acu_daemon.units import Array
 VERSION = 1
 SAVE_PERIOD_S = 10.0  # so much of a pass a crash may lose
 _LARGEST_BYTES = 100_000
-_LEAST_EIGENVALUE = -1e-6  # of the correlations: rounding
+_ROUNDING = 1e-6  # of correlations and their eigenvalues
 
 
 def carry_over_path(directory: Path, norad_id: int | None, name: str) -> Path:
@@ -31,17 +31,16 @@ def carry_over_path(directory: Path, norad_id: int | None, name: str) -> Path:
     return directory / f"carry-over-{label}.json"
 
 
-def read_carry_over(path: Path) -> CarryOver | None:
-    """Read the file; None where there is none, or, with a log line, where it cannot be used."""
+def read_carry_over(path: Path, satellite: str) -> CarryOver | None:
+    """Read the file; None where there is none, or, with a log line, where it is another satellite's or not whole."""
     try:
         with path.open("rb") as file:
             text = file.read(_LARGEST_BYTES)
-        return from_json(json.loads(text))
+        return from_json(json.loads(text), satellite)
     except FileNotFoundError:
         return None
     except (OSError, ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
-        reason = f"{type(error).__name__}: {error}"
-        structlog.get_logger("carry_over").warning("carry_over.unreadable", file=str(path), reason=reason)
+        structlog.get_logger("carry_over").warning("carry_over.unreadable", file=str(path), reason=reason_of(error))
         return None
 
 
@@ -114,10 +113,12 @@ def to_json(satellite: str, carried: CarryOver) -> dict[str, Any]:
     }
 
 
-def from_json(read: Any) -> CarryOver:
-    """Raises: ValueError, TypeError, KeyError: what is wrong."""
+def from_json(read: Any, satellite: str) -> CarryOver:
+    """Raises: ValueError, TypeError, KeyError: what is wrong, such as another satellite."""
     if not isinstance(read, dict) or read.get("version") != VERSION:
         raise ValueError(f"expected a JSON object with version {VERSION}")
+    if read["satellite"] != satellite:
+        raise ValueError(f"it is of {read['satellite']!r}, not of {satellite!r}")
     elements, station = read["elements"], read["station"]
     east_m, north_m, up_m = _numbers(read["station_shift_enu_m"], (3,)).tolist()
     return CarryOver(
@@ -132,6 +133,21 @@ def from_json(read: Any) -> CarryOver:
         station_shift_enu_m=(east_m, north_m, up_m),
         covariance=_covariance(read["covariance"]),
     )
+
+
+def reason_of(error: Exception) -> str:
+    """Why a file of state cannot be used, in words."""
+    match error:
+        case KeyError():
+            return f"{error.args[0]} is missing"
+        case OSError():
+            return error.strerror or str(error)
+        case json.JSONDecodeError() | UnicodeDecodeError() | RecursionError():
+            return f"not JSON, or only a part: {error}"
+        case ValueError():
+            return str(error)
+        case _:
+            return f"not in the form in which it is written: {error}"
 
 
 def number(value: Any) -> float:
@@ -155,11 +171,16 @@ def _numbers(values: Any, shape: tuple[int, ...]) -> Array:
 
 
 def _covariance(values: Any) -> Array:
+    """Zeros belong to states that no fit changes, and to estimators that give none."""
     covariance = _numbers(values, (STATE_COUNT, STATE_COUNT))
-    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    held = np.where(sigma > 0.0, sigma, 1.0)
-    correlation = covariance / np.outer(held, held)
-    is_symmetric = np.allclose(correlation, correlation.T, rtol=0.0, atol=1e-6)
-    if not is_symmetric or np.linalg.eigvalsh(correlation).min() < _LEAST_EIGENVALUE:
+    variance = np.diag(covariance)
+    is_state = variance > 0.0
+    unit = np.sqrt(variance[is_state])
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is not bounded
+        correlation = covariance[np.ix_(is_state, is_state)] / unit / unit[:, None]
+    is_none = not covariance[~is_state].any() and not covariance[:, ~is_state].any()
+    is_bounded = bool((np.abs(correlation) <= 1.0 + _ROUNDING).all())
+    is_symmetric = is_bounded and bool((np.abs(correlation - correlation.T) <= _ROUNDING).all())
+    if not (is_none and is_symmetric and (np.linalg.eigvalsh(correlation) >= -_ROUNDING).all()):
         raise ValueError("covariance: expected a symmetric matrix without negative eigenvalues")
     return covariance

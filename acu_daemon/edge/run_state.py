@@ -15,7 +15,7 @@ import structlog
 
 from acu_daemon.assist.carry_over import CarryOver
 from acu_daemon.control.state import ControlState
-from acu_daemon.edge.carry_over import from_json, number, to_json
+from acu_daemon.edge.carry_over import from_json, number, reason_of, to_json
 from acu_daemon.edge.writer import Latest, Writer, replace_file
 from acu_daemon.errors import OrbitError
 from acu_daemon.model import FitResult, Pass
@@ -65,7 +65,7 @@ def read_run_state(directory: Path) -> RunState:
         structlog.get_logger("run_state").error(
             "run_state.unreadable",
             file=str(path),
-            reason=f"{type(error).__name__}: {error}",
+            reason=reason_of(error),
             action=f"begun anew, without latch and arming; kept as {bad.name}",
         )
         with contextlib.suppress(OSError):
@@ -136,15 +136,16 @@ def _from_json(read: Any) -> RunState:
     arming, clock_s = read["arming"], read["clock_s"]
     if not (arming is None or isinstance(arming, bool)):
         raise ValueError(f"arming = {arming!r}: expected true, false or null")
+    satellite = _text(read["satellite"])
     return RunState(
-        satellite=_text(read["satellite"]),
+        satellite=satellite,
         rise_tai_s=number(read["rise_tai_s"]),
         set_tai_s=number(read["set_tai_s"]),
         clock_s=None if clock_s is None else number(clock_s),
         track=_text(read["state"]),
         arming=arming,
         latch=_text(read["latch"]),
-        fit=None if read["fit"] is None else replace(from_json(read["fit"]), is_of_this_pass=True),
+        fit=None if read["fit"] is None else replace(from_json(read["fit"], satellite), is_of_this_pass=True),
     )
 
 
