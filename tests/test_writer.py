@@ -104,6 +104,17 @@ def test_of_values_that_come_faster_than_they_are_saved_only_the_newest_counts()
     assert saved == [99]
 
 
+def test_a_value_offered_after_one_that_was_saved_at_once_is_saved_too() -> None:
+    """P10: the thread may have done its job before `put` is back."""
+    saved: list[int] = []
+    writer = Writer("test")
+    assert writer.close(PATIENT_S)  # from now on a job is done within `put`
+    latest = Latest(writer, saved.append)
+    for value in range(3):
+        latest.offer(value)
+    assert saved == [0, 1, 2]
+
+
 def test_a_live_line_is_left_out_while_others_wait(tmp_path: Path) -> None:
     writer = Writer("test")
     with (tmp_path / "drawn").open("w") as file:

@@ -3,6 +3,7 @@
 import contextlib
 import os
 import threading
+from collections import deque
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -83,21 +84,24 @@ class Latest(Generic[Value]):
     def __init__(self, writer: Writer, save: Callable[[Value], None]) -> None:
         self._writer = writer
         self._save = save
-        self._newest: list[Value] = []
+        self._newest: deque[Value] = deque(maxlen=1)
         self._is_waiting = False
 
     def offer(self, value: Value) -> None:
         """Take a value; never waits."""
-        self._newest = [value]
+        self._newest.append(value)
         if not self._is_waiting:
-            self._is_waiting = True
-            self._is_waiting = self._writer.put(self._work)
+            self._is_waiting = True  # before the thread may say otherwise
+            if not self._writer.put(self._work):
+                self._is_waiting = False
 
     def _work(self) -> None:
         self._is_waiting = False
-        newest, self._newest = self._newest, []
-        for value in newest:
-            self._save(value)
+        try:
+            newest = self._newest.pop()
+        except IndexError:  # an earlier job has saved it
+            return
+        self._save(newest)
 
 
 class QueuedStream:
