@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from acu_daemon import __version__
-from acu_daemon.cli import check, demo, fake_acu, fault_proxy, hands, passes, replay, run, safe_stop
+from acu_daemon.cli import check, demo, fake_acu, fault_proxy, hands, latency_test, passes, replay, run, safe_stop
 from acu_daemon.errors import AcuDaemonError, NoAcuError, UsageError
 
 EXIT_FAILED, EXIT_USAGE, EXIT_NO_ACU, EXIT_INTERNAL = 1, 2, 3, 4
@@ -57,6 +57,7 @@ app.command(name="fault-proxy")(fault_proxy.command)
 app.command(name="demo")(demo.command)
 app.command(name="passes")(passes.command)
 app.command(name="check")(check.command)
+app.command(name="latency-test")(latency_test.command)
 app.command(name="replay")(replay.command)
 app.command(name="safe-stop")(safe_stop.command)
 for person_says in (hands.arm, hands.disarm, hands.clear, hands.status):

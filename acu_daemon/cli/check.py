@@ -71,7 +71,7 @@ def _findings(config: Path, satellite: str | None) -> Iterator[Finding]:
     yield Finding(GO, "station.toml", f"{station.station.name}, ACU at {station.acu.url}")
     if station.safety.arm == "manual":
         yield Finding(WARN, "arming", '[safety] arm = "manual": the daemon writes nothing until a person arms it')
-    yield _clock()
+    yield clock_finding()
     names = [satellite] if satellite else satellite_names(config)
     if not names:
         yield Finding(NO_GO, "satellites", f"{config}/satellites holds no satellite; put a NAME.toml there")
@@ -111,7 +111,8 @@ def _alarms(snapshot: Path) -> list[str]:
     return [text for text in texts if text]
 
 
-def _clock() -> Finding:
+def clock_finding() -> Finding:
+    """Whether the system clock is synchronised."""
     is_synchronised = is_clock_synchronised()
     if is_synchronised:
         return Finding(GO, "clock", "synchronised")
