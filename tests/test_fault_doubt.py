@@ -97,11 +97,15 @@ def test_one_wild_status_is_left_out_and_the_next_good_one_believed() -> None:
         assert told(HOLDING, wild, HOLDING, wild, HOLDING) == [True, False, True, False, True]
 
 
-def test_what_is_said_twice_is_believed() -> None:
-    """An encoder that really slipped, and an ACU that always contradicts itself."""
-    slipped, odd = replace(HOLDING, az_deg=190.0), replace(HOLDING, is_backup_active=False)
+def test_an_encoder_that_really_slipped_is_believed_at_the_second_reading() -> None:
+    slipped = replace(HOLDING, az_deg=190.0)
     assert told(HOLDING, slipped, slipped, slipped) == [True, False, True, True]
-    assert told(odd, odd, odd, odd) == [False, True, True, True]
+
+
+def test_an_acu_that_always_contradicts_itself_is_believed_after_half_a_second_and_from_then_on() -> None:
+    odd = replace(HOLDING, is_backup_active=False)
+    assert told(*[odd] * 8) == [False, False, False, False, True, True, True, True]
+    assert told(odd, odd, odd, odd, HOLDING, odd) == [False, False, False, False, True, False]
 
 
 def test_two_wild_ones_that_differ_are_both_left_out() -> None:

@@ -1,7 +1,8 @@
 """Whether a status is to be believed.  Pure.
 
-A check byte of XOR passes two characters that changed alike, and two that changed places.  So a status that contradicts
-itself, or that shows an axis where no drive can have brought it, counts only when the next one says the same.
+A check byte of XOR passes two characters that changed alike, and two that changed places.  So a status that shows an
+axis where no drive can have brought it counts only when the next one agrees, and one that contradicts itself, whose
+mode may be anything, when half a second of them agree.
 """
 
 from math import cos, radians
@@ -10,6 +11,7 @@ from acu_daemon.model import AxisLimits
 from acu_daemon.protocol.messages import AcuMode, Backup, Status
 from acu_daemon.units import wrap_180
 
+MOVED_COUNT, CONTRADICTING_COUNT = 2, 5  # in a row, before they are believed
 SLACK_DEG = 1.0  # on the sky: noise, and more is left to the gate of readings
 LEAST_COS_EL = 0.01
 RATE_MARGIN = 1.5  # of the drive's rate
@@ -44,33 +46,34 @@ class Doubt:
         self._azimuth, self._elevation = azimuth, elevation
         self._believed: tuple[float, Status] | None = None
         self._doubted: tuple[float, Status] | None = None
+        self._agreeing_count = 0
         self.count = 0
         self.reason = ""
 
     def believes(self, status: Status, tai_s: float) -> bool:
         """Judge the next status, sampled at an instant; the reason of a doubt is in `reason`."""
-        doubted, self._doubted = self._doubted, None
-        self.reason = self._why(self._believed, status, tai_s)
-        if not self.reason or (doubted is not None and self._agree(doubted, status, tai_s)):
-            self._believed = tai_s, status
-            if self.reason:
-                self._doubted = tai_s, status  # an ACU that always contradicts itself is believed from the second on
-            return True
-        self._doubted = tai_s, status
-        self.count += 1
-        return False
-
-    def _agree(self, doubted: tuple[float, Status], status: Status, tai_s: float) -> bool:
-        return contradictions(doubted[1]) == contradictions(status) and not self._moved(doubted, status, tai_s)
-
-    def _why(self, believed: tuple[float, Status] | None, status: Status, tai_s: float) -> str:
         wrong = contradictions(status)
-        if wrong:
-            return f"contradicts itself: {', '.join(wrong)}"
-        return "" if believed is None else self._moved(believed, status, tai_s)
+        self.reason = f"contradicts itself: {', '.join(wrong)}" if wrong else self._moved(self._believed, status, tai_s)
+        if not self.reason:
+            self._doubted, self._agreeing_count = None, 0
+        else:
+            self._agreeing_count = 1 + (self._agreeing_count if self._agrees(status, wrong, tai_s) else 0)
+            self._doubted = tai_s, status
+            if self._agreeing_count < (CONTRADICTING_COUNT if wrong else MOVED_COUNT):
+                self.count += 1
+                return False
+        self._believed = tai_s, status
+        return True
 
-    def _moved(self, before: tuple[float, Status], status: Status, tai_s: float) -> str:
-        """Which axis moved further than its drive can."""
+    def _agrees(self, status: Status, wrong: tuple[str, ...], tai_s: float) -> bool:
+        """Whether the last doubted status, just before this one, says the same."""
+        doubted = self._doubted
+        return doubted is not None and contradictions(doubted[1]) == wrong and not self._moved(doubted, status, tai_s)
+
+    def _moved(self, before: tuple[float, Status] | None, status: Status, tai_s: float) -> str:
+        """Which axis moved further than its drive can; empty: none, or nothing is known of before."""
+        if before is None:
+            return ""
         span_s = max(tai_s - before[0], 0.0)
         az_deg = abs(wrap_180(status.az_deg - before[1].az_deg))
         el_deg = abs(status.el_deg - before[1].el_deg)
