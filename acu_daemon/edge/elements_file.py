@@ -103,7 +103,7 @@ def _from_ephemeris(
         raise ElementsError("\n".join(_few(problems, "segments")))
     wanted = satellite.satellite
     try:
-        segments = select_segments(segments, wanted.norad_id, wanted.name, is_whole=not problems)
+        segments, doubts = select_segments(segments, wanted.norad_id, wanted.name, is_whole=not problems)
     except ElementsError as error:
         raise ElementsError("\n".join([str(error), *_few(problems, "segments")])) from None
     propagator = OemPropagator(Ephemeris(segments, orientation))
@@ -113,7 +113,7 @@ def _from_ephemeris(
         propagator.ephemeris.label,
         propagator.epoch_tai_s,
         errors,
-        [*warnings, *_few(problems, "segments")],
+        [*doubts, *warnings, *_few(problems, "segments")],
     )
 
 

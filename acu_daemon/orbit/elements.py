@@ -28,6 +28,7 @@ __all__ = [
 
 _DECAYED_PERIGEE_KM = 120.0  # below this an orbit does not last a revolution
 _NAMED_IN_MESSAGES = 5
+_VERSIONS = ("1.0", "2.0", "3.0")  # of orbit ephemeris messages, CCSDS 502.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,22 +151,20 @@ def select_elements(
 
 def select_segments(
     segments: Sequence[OemSegment], norad_id: int | None, name: str, *, is_whole: bool = True
-) -> list[OemSegment]:
+) -> tuple[list[OemSegment], list[str]]:
     """Choose a satellite's segments of an ephemeris.
 
-    A file with one satellite is taken as it is; else, or without is_whole (segments could not be read), the name must
-    be the OBJECT_NAME or the OBJECT_ID (case, hyphens and blanks do not count), or the OBJECT_ID be the norad_id.
+    A file with one satellite is taken as it is, with a warning where nothing in it says that it is this one; else, or
+    without is_whole (segments could not be read), the name must be the OBJECT_NAME or the OBJECT_ID (case, hyphens and
+    blanks do not count), or the OBJECT_ID be the norad_id.
     An OBJECT_ID that is another catalogue number is never taken.
+    Returns: the segments, and warnings.
     Raises:  ElementsError: none of this satellite, or two.
     """
     file, labels = segments[0].file, _labels(segments)
     found = [one for one in segments if norad_id is None or not one.object_id.isdigit() or _is_number(one, norad_id)]
     if not is_whole or len(labels) > 1:
-        found = [
-            one
-            for one in found
-            if _plain(name) in (_plain(one.name), _plain(one.object_id)) or _is_number(one, norad_id)
-        ]
+        found = [one for one in found if _is_named(one, name) or _is_number(one, norad_id)]
     if not found:
         also = f" or with norad_id {norad_id}" if norad_id is not None else ""
         raise ElementsError(
@@ -176,7 +175,26 @@ def select_segments(
         raise ElementsError(
             f"{file}: the name {name!r} fits {', '.join(labels)}; write one's designator as the satellite's name"
         )
-    return found
+    return found, [*_doubt_of(found[0], norad_id, name), *_version_of(found[0])]
+
+
+def _is_named(segment: OemSegment, name: str) -> bool:
+    return _plain(name) in (_plain(segment.name), _plain(segment.object_id))
+
+
+def _doubt_of(segment: OemSegment, norad_id: int | None, name: str) -> list[str]:
+    """A name that is longer or shorter than the file's, such as ISS for ISS (ZARYA), is no other one."""
+    short, long = sorted((_plain(name), _plain(segment.name)), key=len)
+    if short in long or _is_named(segment, name) or _is_number(segment, norad_id):
+        return []
+    return [f"{segment.file}: the file is of {segment.label}, the satellite is named {name!r}: is it the right file?"]
+
+
+def _version_of(segment: OemSegment) -> list[str]:
+    if segment.version in _VERSIONS:
+        return []
+    given = f"CCSDS_OEM_VERS is {segment.version[:40]!r}" if segment.version else "CCSDS_OEM_VERS is missing"
+    return [f"{segment.file}: {given}; versions {', '.join(_VERSIONS)} are known, the file is read as those are"]
 
 
 def _labels(segments: Sequence[OemSegment]) -> list[str]:

@@ -91,8 +91,8 @@ class OemPropagator:
     to the shifted one as well.  A shift that leaves the span goes on by two-body motion (30 m off after a minute).
     The other corrections are added to the osculating elements at each time.  What they change in the secular drifts is
     left out: 0.01 deg of inclination (1.2 km) would move the ISS by 0.3 km a day.  Within a pass it does not show, the
-    fit of node and anomaly takes it up.  `epoch_tai_s` is the message's creation, from which on the states are predicted,
-    or the time of the spans next to it.
+    fit of node and anomaly takes it up.  `epoch_tai_s` is the message's creation, from which on the states are
+    predicted, or the time of the spans next to it.
     """
 
     kind = "oem"

@@ -44,6 +44,7 @@ class OemSegment:
     r_m, v_m_s: (N, 3) in `frame`; in ITRF the velocity is that seen by an observer who turns with the Earth.
     """
 
+    version: str  # of the message; empty where it says none
     name: str
     object_id: str
     frame: Frame
@@ -72,6 +73,7 @@ class _Raw:
     """A segment as text."""
 
     line: int
+    version: str
     created: str
     fields: dict[str, str] = field(default_factory=dict)
     states: list[tuple[int, str, list[str]]] = field(default_factory=list)  # line, epoch, six numbers
@@ -112,21 +114,21 @@ def parse_oem(text: str, file: str) -> tuple[list[OemSegment], list[Problem]]:
 def _read_kvn(text: str) -> list[_Raw]:
     found: list[_Raw] = []
     where: Literal["header", "meta", "data", "covariance"] = "header"
-    created = ""
+    version = created = ""
     for number, raw_line in enumerate(text.split("\n"), start=1):
         line = raw_line.strip()
         word = line.split(maxsplit=1)[0] if line else "COMMENT"
         if word == "COMMENT":
             continue
         if word == "META_START":
-            found.append(_Raw(number, created))
+            found.append(_Raw(number, version, created))
             where = "meta"
         elif word == "META_STOP":
             where = "data"
         elif word in ("COVARIANCE_START", "COVARIANCE_STOP"):
             where = "covariance" if word == "COVARIANCE_START" else "data"
         elif word.startswith("CCSDS_OEM_VERS"):
-            where, created = "header", ""
+            where, version, created = "header", line.partition("=")[2].strip(), ""
         elif where == "header" and word.startswith("CREATION_DATE"):
             created = line.partition("=")[2].strip()
         elif where == "meta":
@@ -179,17 +181,20 @@ class _XmlReader:
         self._line = 0
         self._text: list[str] = []
         self._leaves: dict[str, str] = {}
+        self._version = ""
         self._created = ""
 
     def _refuse(self, *_declaration: object) -> None:
         reason = "a DOCTYPE or ENTITY declaration: an OEM has none, so the file is not read"
         raise _BadSegmentError(reason, self.parser.CurrentLineNumber)
 
-    def _start(self, tag: str, _attributes: Mapping[str, str]) -> None:
+    def _start(self, tag: str, attributes: Mapping[str, str]) -> None:
         name = tag.rpartition(":")[2]
         self._text = []
         if name == "segment":
-            self.found.append(_Raw(self.parser.CurrentLineNumber, self._created))
+            self.found.append(_Raw(self.parser.CurrentLineNumber, self._version, self._created))
+        elif name == "oem":
+            self._version = attributes.get("version", "").strip()
         elif name == "header":
             self._created = ""
         elif name in ("metadata", "stateVector"):
@@ -235,6 +240,7 @@ def _segment(raw: _Raw, file: str) -> OemSegment:
     states = np.array([_numbers(values, line) for line, _, values in raw.states]) * 1e3
     start_tai_s, end_tai_s = _span_tai_s(raw, system, tai_s)
     return OemSegment(
+        version=raw.version,
         name=raw.fields.get("OBJECT_NAME", "").strip() or "(no OBJECT_NAME)",
         object_id=raw.fields.get("OBJECT_ID", ""),
         frame=frame,

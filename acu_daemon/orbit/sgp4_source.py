@@ -86,7 +86,9 @@ def _refusal(source: Sgp4Propagator, tai_s: float, code: int) -> str:
     age_days = (tai_s - elements.epoch_tai_s) / DAY_S
     advice = "use newer elements"
     if code != _DECAYED and source.correction != Correction():
-        advice = "so far do the readings correct the elements: are they this satellite's, and is [uncertainty] too wide?"
+        advice = (
+            "so far do the readings correct the elements: are they this satellite's, and is [uncertainty] too wide?"
+        )
     return (
         f"{elements.label}: no position at {utc_text(tai_s)}, {age_days:.1f} days after the epoch of the elements: "
         f"{reason} (SGP4 error {code}); {advice}"
