@@ -111,6 +111,36 @@ def test_a_catalogue_number_chooses_only_where_the_file_has_them(tmp_path: Path)
     )
 
 
+@pytest.mark.parametrize(
+    ("name", "norad_id", "is_doubted"),
+    [
+        *(("ISS", 25544, False), ("iss-", None, False), ("ISS (ZARYA)", 25544, False), ("1998-067A", None, False)),
+        *(("JASON 2", 33105, True), ("JASON 2", None, True)),
+    ],
+)
+def test_a_file_of_one_satellite_with_another_name_is_doubted(
+    tmp_path: Path, name: str, norad_id: int | None, is_doubted: bool
+) -> None:
+    loaded = load(tmp_path, kvn(states()), satellite=from_file(name, "oem", "iss.oem", norad_id))
+    assert loaded.errors == []
+    said = [f"{tmp_path}/satellites/iss.oem: the file is of ISS (1998-067-A), the satellite is named {name!r}: "]
+    assert [text.removesuffix("is it the right file?") for text in loaded.warnings] == (said if is_doubted else [])
+
+
+@pytest.mark.parametrize(
+    ("form", "old", "new", "said"),
+    [
+        (kvn, "VERS = 2.0", "VERS = 9.0", "CCSDS_OEM_VERS is '9.0'; versions 1.0, 2.0, 3.0 are known"),
+        (kvn, "CCSDS_OEM_VERS = 2.0\n", "", "CCSDS_OEM_VERS is missing; versions 1.0, 2.0, 3.0 are known"),
+        (xml, " version='2.0'>", " version='9.0'>", "CCSDS_OEM_VERS is '9.0'"),
+        (xml, " version='2.0'>", ">", "CCSDS_OEM_VERS is missing"),
+    ],
+)
+def test_a_version_that_is_not_known_is_warned_of(tmp_path: Path, form, old: str, new: str, said: str) -> None:
+    [warning] = load(tmp_path, form(states()).replace(old, new)).warnings
+    assert warning.startswith(f"{tmp_path}/satellites/iss.oem: {said}")
+
+
 def test_the_stations_earth_orientation_reaches_an_earth_fixed_ephemeris(tmp_path: Path) -> None:
     tai_s, r_m, v_m_s = states()
     turned = EarthOrientation(0.4)
@@ -138,6 +168,20 @@ def test_passes_before_or_after_the_ephemeris_are_none_and_the_reason_is_told(tm
     done = passes(config, "--from", utc_text(START + DAY_S, 0))
     assert (done.code, json.loads(done.out)) == (0, [])
     assert "the ephemeris covers 2022-02-11T20:00:00Z to 2022-02-11T22:00:00Z" in done.err
+
+
+def test_a_pass_that_the_ephemeris_cuts_is_told_and_so_is_a_gap(tmp_path: Path) -> None:
+    one = first_high_pass()
+    early, late = one.rise_tai_s + 100.0, one.rise_tai_s + 250.0
+    before = states(60.0 * np.floor((early - START) / 60.0))
+    after = states(7200.0, start_tai_s=START + 60.0 * np.ceil((late - START) / 60.0))
+    done = passes(make(tmp_path, kvn(before, after)), "--from", utc_text(START, 0))
+    end, begin = utc_text(before[0][-1], 0), utc_text(after[0][0], 0)
+    rise, setting = utc_text(one.rise_tai_s, 0), utc_text(one.set_tai_s, 0)
+    assert f"warning: iss: the ephemeris has a gap from {end} to {begin}, no pass is looked for in it" in done.err
+    assert f"warning: iss: the pass from {rise} to {end} is cut: the ephemeris ends within it" in done.err
+    assert f"warning: iss: the pass from {begin} to {setting} is cut: the ephemeris begins within it" in done.err
+    assert done.err.count(" is cut: ") == 2
 
 
 def coming_of(directory: Path, start_tai_s: float, end_tai_s: float, now_tai_s: float) -> Pass:
@@ -207,6 +251,19 @@ def test_replay_of_a_recording_outside_the_ephemeris_is_refused(tmp_path: Path) 
     )
     assert done.code == 2
     assert "the ephemeris covers 2022-02-11T20:00:00Z to" in done.err
+
+
+def test_replay_of_a_recording_that_outlasts_the_ephemeris_is_refused_before_it_begins(tmp_path: Path) -> None:
+    make(tmp_path, kvn(states()))
+    rows = [f"{utc_text(START + after_s)},10.0,20.0,1\n" for after_s in (600.0, 7190.0)]
+    (tmp_path / "in.csv").write_text("".join(["utc,az_deg,el_deg,locked\n", *rows]))
+    done = acu_daemon(
+        *("replay", "--config", tmp_path, "--satellite", "iss"),
+        *("--readings", tmp_path / "in.csv", "--out", tmp_path / "out.csv"),
+    )
+    assert done.code == 2
+    assert "in.csv needs an ephemeris from 2022-02-11T20:" in done.err
+    assert "to 2022-02-11T22:00:22Z; this one covers 2022-02-11T20:00:00Z to" in done.err
 
 
 def test_the_daemon_stays_on_a_satellite_that_runs_off_its_ephemeris_through_a_loss(tmp_path: Path) -> None:

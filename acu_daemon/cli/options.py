@@ -3,6 +3,7 @@
 import math
 import signal
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
 
@@ -134,11 +135,41 @@ def not_covered(target: Target, coming: Pass, now_tai_s: float) -> str:
     from_tai_s = max(coming.rise_tai_s - tracking.preposition_s, now_tai_s)
     from_tai_s -= longest_window_s(target.station.acu.azimuth.limits()) + SPARE_S
     to_tai_s = coming.set_tai_s + tracking.horizon_s + SPARE_S
+    return lacking(
+        target, f"the pass of {target.elements.label} at {utc_text(coming.rise_tai_s, 0)}", from_tai_s, to_tai_s
+    )
+
+
+def lacking(target: Target, what: str, from_tai_s: float, to_tai_s: float) -> str:
+    """Say that an ephemeris does not cover a span for what it is needed; empty where the elements do."""
     spans = spans_tai_s(target.elements.propagator)
     if any(start <= from_tai_s and to_tai_s <= end for start, end in spans):
         return ""
     covered = " and ".join(f"{utc_text(start, 0)} to {utc_text(end, 0)}" for start, end in spans)
     return (
-        f"the pass of {target.elements.label} at {utc_text(coming.rise_tai_s, 0)} needs an ephemeris from "
-        f"{utc_text(from_tai_s, 0)} to {utc_text(to_tai_s, 0)}; this one covers {covered}: fetch a longer one"
+        f"{what} needs an ephemeris from {utc_text(from_tai_s, 0)} to {utc_text(to_tai_s, 0)}; "
+        f"this one covers {covered}: fetch a longer one"
     )
+
+
+def cut_passes(target: Target, passes: list[Pass]) -> list[str]:
+    """Say which passes begin or end only because an ephemeris does."""
+    spans = spans_tai_s(target.elements.propagator)
+    starts, ends = {start for start, _ in spans}, {end for _, end in spans}
+    said = []
+    for one in passes:
+        of = f"the pass from {utc_text(one.rise_tai_s, 0)} to {utc_text(one.set_tai_s, 0)} is cut:"
+        if one.rise_tai_s in starts:
+            said.append(f"{of} the ephemeris begins within it")
+        if one.set_tai_s in ends:
+            said.append(f"{of} the ephemeris ends within it")
+    return said
+
+
+def gaps(target: Target, start_tai_s: float, end_tai_s: float) -> list[str]:
+    """Say where a search has nothing to look at between the spans of an ephemeris."""
+    return [
+        f"the ephemeris has a gap from {utc_text(end, 0)} to {utc_text(start, 0)}, no pass is looked for in it"
+        for (_, end), (start, _) in pairwise(spans_tai_s(target.elements.propagator))
+        if end < end_tai_s and start > start_tai_s
+    ]

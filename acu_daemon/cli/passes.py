@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from acu_daemon.cli.options import Config, ending, load_target, parse_utc
+from acu_daemon.cli.options import Config, cut_passes, ending, gaps, load_target, parse_utc
 from acu_daemon.config import satellite_names
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.errors import OrbitError, UsageError
@@ -70,7 +70,10 @@ def _passes(config: Path, name: str, start_tai_s: float, end_tai_s: float) -> li
     if until := ending(target, end_tai_s):
         typer.echo(f"warning: {name}: {until}, no pass is looked for after that", err=True)
     lowest_deg = target.station.station.min_elevation_deg
-    return find_passes(target.elements.propagator, target.station.site, start_tai_s, end_tai_s, lowest_deg)
+    found = find_passes(target.elements.propagator, target.station.site, start_tai_s, end_tai_s, lowest_deg)
+    for text in [*gaps(target, start_tai_s, end_tai_s), *cut_passes(target, found)]:
+        typer.echo(f"warning: {name}: {text}", err=True)
+    return found
 
 
 def _as_text(name: str, one: Pass) -> str:

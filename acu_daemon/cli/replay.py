@@ -10,14 +10,15 @@ from typing import Annotated
 import typer
 
 from acu_daemon.assist.estimator import ESTIMATORS
-from acu_daemon.cli.options import Config, Satellite, Target, load_target
+from acu_daemon.cli.options import SPARE_S, Config, Satellite, Target, lacking, load_target
 from acu_daemon.config import estimator_settings
 from acu_daemon.control.comparison import compare, what_is_left_out
 from acu_daemon.control.refit import RefitSetup
-from acu_daemon.control.replay import Replayed, replay
+from acu_daemon.control.replay import BUFFER_S, Replayed, replay
 from acu_daemon.edge.recording import read_readings
 from acu_daemon.errors import UsageError
 from acu_daemon.model import Reading
+from acu_daemon.pointing.keyhole import longest_window_s
 
 ALL = "all"
 
@@ -67,6 +68,9 @@ def command(
     if not lines:
         raise UsageError(f"{readings}: no readings below the header")
     job = _Job(load_target(config, satellite, lines[0][2]), lines)
+    from_tai_s = lines[0][2] - longest_window_s(job.target.station.acu.azimuth.limits()) - SPARE_S
+    if uncovered := lacking(job.target, f"{readings}", from_tai_s, lines[-1][2] + BUFFER_S + SPARE_S):
+        raise UsageError(uncovered)
     for warning in job.target.elements.warnings:
         typer.echo(f"warning: {warning}", err=True)
     results: dict[str, list[Replayed]] = {}
