@@ -191,6 +191,18 @@ def test_a_serial_line_too_slow_for_ten_writes_a_second_is_no_go_with_the_arithm
     assert "characters of 2.083 ms" in lines(done)["line rate"][1]
 
 
+def test_a_rehearsal_is_checked_at_its_own_time(tmp_path: Path) -> None:
+    with acu() as there:
+        write(tmp_path, station(there.url))
+        at = acu_daemon("check", "--config", tmp_path, "--at", "1989-02-03T00:00:00Z")
+        late = acu_daemon("check", "--config", tmp_path, "--at", "1999-02-03T00:00:00Z")
+    assert lines(at)["scd: elements"] == ("GO", "epoch 1989-01-31T09:58:00Z, 2.6 days old")
+    assert lines(at)["scd: next pass"][1].startswith("1989-02-03T")
+    assert lines(late)["scd: elements"][0] == "NO-GO"
+    wrong = acu_daemon("check", "--config", tmp_path, "--at", "soon")
+    assert (wrong.code, "--at 'soon': expected UTC as" in wrong.err) == (2, True)
+
+
 def test_every_satellite_of_the_directory_is_checked_unless_one_is_named(tmp_path: Path) -> None:
     with acu() as small:
         write(

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from acu_daemon.cli.options import Config, Target, ending, load_target, not_covered
+from acu_daemon.cli.options import Config, Target, ending, load_target, not_covered, parse_utc
 from acu_daemon.config import load_station, satellite_names
 from acu_daemon.control.plan import plan_pass
 from acu_daemon.edge.clock import SystemClock, is_clock_synchronised
@@ -43,6 +43,12 @@ def command(
     satellite: Annotated[
         str | None, typer.Option("--satellite", help="Also this satellite's elements and next pass.  Default: all.")
     ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(
+            "--at", metavar="UTC", help="Check elements and next pass for a rehearsal at this time.  Default: now."
+        ),
+    ] = None,
     running: Annotated[
         bool, typer.Option("--running", help="Only look whether the daemon that runs here ticks (for health checks).")
     ] = False,
@@ -52,8 +58,9 @@ def command(
 
     A line per check, GO, WARN or NO-GO; exit status 1 if any is NO-GO.
     """
+    now_tai_s = SystemClock().tai_s() if at is None else parse_utc("--at", at)
     worst = GO
-    for finding in [_running(state)] if running else _findings(config, satellite):
+    for finding in [_running(state)] if running else _findings(config, satellite, now_tai_s):
         typer.echo(f"{finding.verdict:6} {finding.what:22} {'; '.join(finding.detail.splitlines())}")
         if finding.verdict == NO_GO or (finding.verdict == WARN and worst == GO):
             worst = finding.verdict
@@ -62,7 +69,7 @@ def command(
         raise typer.Exit(1)
 
 
-def _findings(config: Path, satellite: str | None) -> Iterator[Finding]:
+def _findings(config: Path, satellite: str | None, now_tai_s: float) -> Iterator[Finding]:
     try:
         station = load_station(config)
     except UsageError as error:
@@ -76,7 +83,7 @@ def _findings(config: Path, satellite: str | None) -> Iterator[Finding]:
     if not names:
         yield Finding(NO_GO, "satellites", f"{config}/satellites holds no satellite; put a NAME.toml there")
     for name in names:
-        yield from _satellite(config, name)
+        yield from _satellite(config, name, now_tai_s)
     try:
         link = make_link(station.acu.url)
         check_rate(link, station.acu.period_s, station.acu.device_delay_s)
@@ -121,8 +128,7 @@ def clock_finding() -> Finding:
     return Finding(WARN, "clock", "not synchronised; start chrony or ntpd: 0.1 s is up to 0.1 deg on a low orbit")
 
 
-def _satellite(config: Path, name: str) -> Iterator[Finding]:
-    now_tai_s = SystemClock().tai_s()
+def _satellite(config: Path, name: str, now_tai_s: float) -> Iterator[Finding]:
     try:
         target = load_target(config, name, now_tai_s, is_strict=False)
     except AcuDaemonError as error:
