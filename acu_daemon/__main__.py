@@ -1,6 +1,20 @@
-"""`python -m acu_daemon`: the same as the command `acu-daemon`."""
+"""`python -m acu_daemon`, and the command `acu-daemon`."""
 
-from acu_daemon.cli import main
+import gc
+import sys
+
+
+def main() -> None:
+    """Run the command line.  A Ctrl-C ends it without a traceback from the first moment on."""
+    try:
+        gc.disable()  # what is loaded is no garbage, and looking for some takes a tenth of the start
+        from acu_daemon.cli import main as command_line
+
+        gc.enable()
+        command_line()
+    except KeyboardInterrupt:
+        sys.exit(130)
+
 
 if __name__ == "__main__":
     main()

@@ -3,24 +3,33 @@
 import os
 import sys
 import traceback
+from collections.abc import Iterable
+from importlib import import_module
 from typing import Annotated
 
 import typer
 
 from acu_daemon import __version__
-from acu_daemon.cli import check, demo, fake_acu, fault_proxy, hands, latency_test, passes, replay, run, safe_stop
 from acu_daemon.errors import AcuDaemonError, NoAcuError, UsageError
 
 EXIT_FAILED, EXIT_USAGE, EXIT_NO_ACU, EXIT_INTERNAL = 1, 2, 3, 4
 
-app = typer.Typer(
-    name="acu-daemon",
-    no_args_is_help=True,
-    add_completion=False,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-    help="""
+COMMANDS = {  # name: module of acu_daemon.cli, and the function in it
+    "run": ("run", "command"),
+    "fake-acu": ("fake_acu", "command"),
+    "fault-proxy": ("fault_proxy", "command"),
+    "demo": ("demo", "command"),
+    "passes": ("passes", "command"),
+    "check": ("check", "command"),
+    "latency-test": ("latency_test", "command"),
+    "replay": ("replay", "command"),
+    "safe-stop": ("safe_stop", "command"),
+    "arm": ("hands", "arm"),
+    "disarm": ("hands", "disarm"),
+    "clear": ("hands", "clear"),
+    "status": ("hands", "status"),
+}
+HELP = """
     Assisted tracking: keeps an antenna on a low-orbit satellite when its signal is lost.
 
     While the antenna control unit (ACU) autotracks, the daemon learns from its angles where the orbit really is, and
@@ -32,8 +41,7 @@ app = typer.Typer(
 
     Exit status: 0 done, 1 the check or the pass failed, 2 wrong use or configuration, 3 no ACU within 10 s, 4 internal
     error.
-    """,
-)
+    """
 
 
 def _version(is_asked: bool) -> None:
@@ -42,7 +50,6 @@ def _version(is_asked: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _common(
     _version_asked: Annotated[
         bool, typer.Option("--version", help="Show the version and end.", callback=_version, is_eager=True)
@@ -51,23 +58,29 @@ def _common(
     """Options before the command."""
 
 
-app.command(name="run")(run.command)
-app.command(name="fake-acu")(fake_acu.command)
-app.command(name="fault-proxy")(fault_proxy.command)
-app.command(name="demo")(demo.command)
-app.command(name="passes")(passes.command)
-app.command(name="check")(check.command)
-app.command(name="latency-test")(latency_test.command)
-app.command(name="replay")(replay.command)
-app.command(name="safe-stop")(safe_stop.command)
-for person_says in (hands.arm, hands.disarm, hands.clear, hands.status):
-    app.command()(person_says)
+def make_app(names: Iterable[str]) -> typer.Typer:
+    """The command line with these commands; only their modules are loaded: a restart in mid-pass is in a hurry."""
+    app = typer.Typer(
+        name="acu-daemon",
+        no_args_is_help=True,
+        add_completion=False,
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+        help=HELP,
+    )
+    app.callback()(_common)
+    for name in names:
+        module, function = COMMANDS[name]
+        app.command(name=name)(getattr(import_module(f"acu_daemon.cli.{module}"), function))
+    return app
 
 
 def main() -> None:
     """Run a command; every failure ends with its exit status and a message that says what to do."""
+    asked = sys.argv[1:2]
     try:
-        app()
+        make_app(asked if asked and asked[0] in COMMANDS else COMMANDS)()
     except NoAcuError as error:
         _complain(error)
         sys.exit(EXIT_NO_ACU)
