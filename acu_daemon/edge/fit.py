@@ -15,6 +15,7 @@ from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
+import structlog
 
 from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup, Refitter
 from acu_daemon.errors import AcuDaemonError, OrbitError
@@ -71,6 +72,8 @@ class ProcessFitRunner:
         """Ask the child.  Raises: FitDiedError, after which the next call starts a new child; FitFailedError."""
         if len(request.readings):
             self._given.append(request.readings)
+        if self._child is not None and self._child.returncode is not None:
+            structlog.get_logger("fit").warning("fit.process_ended", code=self._child.returncode, action="replaced")
         is_new = self._child is None or self._child.returncode is not None
         timeout_s = self._timeout_s + (START_S if is_new else 0.0)
         try:
