@@ -200,7 +200,7 @@ def test_a_rehearsal_is_checked_at_its_own_time(tmp_path: Path) -> None:
     assert lines(at)["scd: next pass"][1].startswith("1989-02-03T")
     assert lines(late)["scd: elements"][0] == "NO-GO"
     wrong = acu_daemon("check", "--config", tmp_path, "--at", "soon")
-    assert (wrong.code, "--at 'soon': expected UTC as" in wrong.err) == (2, True)
+    assert (wrong.code, "--at 'soon': " in wrong.err) == (2, True)
 
 
 def test_every_satellite_of_the_directory_is_checked_unless_one_is_named(tmp_path: Path) -> None:
