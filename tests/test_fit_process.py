@@ -171,5 +171,14 @@ async def test_the_child_is_nice_and_ends_with_its_parent() -> None:
 
 
 def test_a_child_whose_parent_is_gone_ends_by_itself_without_a_word() -> None:
-    done = subprocess.run([sys.executable, "-m", "acu_daemon.edge.fit"], stdin=subprocess.DEVNULL, capture_output=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "acu_daemon.edge.fit_child"], stdin=subprocess.DEVNULL, capture_output=True
+    )
     assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
+
+
+def test_the_child_loads_only_what_a_fit_needs() -> None:
+    code = "import acu_daemon.edge.fit_child, sys; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.split())
+    assert not loaded & {"asyncio", "structlog", "rich", "pydantic", "typer", "serial", "matplotlib"}

@@ -1,28 +1,22 @@
 """The fit runner: a spawned, niced child process, or inline with a fixed virtual latency (design section 2).
 
-The child speaks length-prefixed pickles over its standard input and output; nothing but this program writes to it.
 The foreground never waits for it; a child that dies or hangs is replaced and given the pass's readings again.
 """
 
 import asyncio
 import contextlib
-import os
 import pickle
-import signal
-import struct
 import sys
 from dataclasses import replace
 from typing import Any, Protocol
 
-import numpy as np
 import structlog
 
 from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup, Refitter
-from acu_daemon.errors import AcuDaemonError, OrbitError
+from acu_daemon.edge.fit_child import LENGTH
+from acu_daemon.errors import AcuDaemonError
 from acu_daemon.model import Readings
 
-_LENGTH = struct.Struct("<Q")
-NICENESS = 10
 START_S = 20.0  # a child that starts may take this much longer: niced, on a busy machine, it loads numpy first
 
 
@@ -105,7 +99,7 @@ class ProcessFitRunner:
         self._child = await asyncio.create_subprocess_exec(
             sys.executable,
             "-m",
-            "acu_daemon.edge.fit",
+            "acu_daemon.edge.fit_child",
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
             start_new_session=True,  # a Ctrl-C is for the daemon, which ends the child itself
@@ -118,13 +112,13 @@ class ProcessFitRunner:
         if self._child is None or self._child.stdin is None:
             raise OSError("no child")
         data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
-        self._child.stdin.write(_LENGTH.pack(len(data)) + data)
+        self._child.stdin.write(LENGTH.pack(len(data)) + data)
         await self._child.stdin.drain()
 
     async def _receive(self) -> Any:
         if self._child is None or self._child.stdout is None:
             raise OSError("no child")
-        (size,) = _LENGTH.unpack(await self._child.stdout.readexactly(_LENGTH.size))
+        (size,) = LENGTH.unpack(await self._child.stdout.readexactly(LENGTH.size))
         return pickle.loads(await self._child.stdout.readexactly(size))
 
     async def close(self) -> None:
@@ -142,37 +136,3 @@ def _with_readings(request: RefitRequest, given: list[Readings]) -> RefitRequest
     if not given:
         return request
     return replace(request, readings=Readings.joined(given))
-
-
-def _read(size: int) -> bytes:
-    data = sys.stdin.buffer.read(size)
-    if len(data) < size:
-        raise EOFError
-    return data
-
-
-def _receive() -> Any:
-    (size,) = _LENGTH.unpack(_read(_LENGTH.size))
-    return pickle.loads(_read(size))
-
-
-def _child() -> None:
-    """Serve requests until the parent closes the pipe."""
-    os.nice(NICENESS)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a Ctrl-C is for the daemon, which ends the child itself
-    refitter = Refitter(_receive())
-    while True:
-        request: RefitRequest = _receive()
-        reply: RefitReply | str
-        try:
-            reply = refitter.refit(request)
-        except (OrbitError, ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
-            reply = f"the fit failed: {error}"
-        data = pickle.dumps(reply, protocol=pickle.HIGHEST_PROTOCOL)
-        sys.stdout.buffer.write(_LENGTH.pack(len(data)) + data)
-        sys.stdout.buffer.flush()
-
-
-if __name__ == "__main__":
-    with contextlib.suppress(EOFError, BrokenPipeError):
-        _child()

@@ -1,0 +1,54 @@
+"""The fit's child process: requests in, replies out, as length-prefixed pickles over its standard input and output.
+
+It loads what a fit needs and nothing else: no event loop, no logging.
+"""
+
+import contextlib
+import os
+import pickle
+import signal
+import struct
+import sys
+from typing import Any
+
+import numpy as np
+
+from acu_daemon.control.refit import RefitReply, RefitRequest, Refitter
+from acu_daemon.errors import OrbitError
+
+LENGTH = struct.Struct("<Q")
+NICENESS = 10
+
+
+def _read(size: int) -> bytes:
+    data = sys.stdin.buffer.read(size)
+    if len(data) < size:
+        raise EOFError
+    return data
+
+
+def _receive() -> Any:
+    (size,) = LENGTH.unpack(_read(LENGTH.size))
+    return pickle.loads(_read(size))
+
+
+def serve() -> None:
+    """Serve requests until the parent closes the pipe."""
+    os.nice(NICENESS)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a Ctrl-C is for the daemon, which ends the child itself
+    refitter = Refitter(_receive())
+    while True:
+        request: RefitRequest = _receive()
+        reply: RefitReply | str
+        try:
+            reply = refitter.refit(request)
+        except (OrbitError, ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
+            reply = f"the fit failed: {error}"
+        data = pickle.dumps(reply, protocol=pickle.HIGHEST_PROTOCOL)
+        sys.stdout.buffer.write(LENGTH.pack(len(data)) + data)
+        sys.stdout.buffer.flush()
+
+
+if __name__ == "__main__":
+    with contextlib.suppress(EOFError, BrokenPipeError):
+        serve()
