@@ -1,5 +1,6 @@
 """`acu-daemon replay`: recorded readings through the daemon's own fit and prediction."""
 
+import os
 import sys
 import time
 from collections.abc import Callable
@@ -62,6 +63,7 @@ def command(
     names: list[str | None] = [*ESTIMATORS] if estimator == ALL else [estimator]
     paths = {name: _beside(out, name) if estimator == ALL else out for name in names}
     for path in paths.values():
+        _refuse_unwritable(path)
         if path.exists() and readings.exists() and path.samefile(readings):
             raise UsageError(f"--out {path} is the recording itself; give the predictions a file of their own")
     lines = read_readings(readings, lambda said: typer.echo(f"warning: {said}", err=True))
@@ -85,6 +87,16 @@ def command(
         return
     (only,) = results.values()
     typer.echo(f"readings left out of the fit: {what_is_left_out(only[-1].left_out)}", err=True)
+
+
+def _refuse_unwritable(path: Path) -> None:
+    """UsageError: a replay of minutes would end without its file."""
+    if path.is_dir():
+        raise UsageError(f"--out {path} is a directory; give a file's name")
+    if not path.parent.is_dir():
+        raise UsageError(f"--out {path}: there is no directory {path.parent}; make it first")
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise UsageError(f"--out {path} cannot be written: permission denied")
 
 
 def _beside(out: Path, name: str | None) -> Path:
