@@ -515,12 +515,13 @@ class Stalling(LoopClock):
     """Wakes 0.35 s late, once."""
 
     stalls_at_tai_s = T + 15.0
+    stall_s = 0.35
 
     async def sleep_until(self, tai_s: float) -> None:
         await super().sleep_until(tai_s)
         if tai_s >= self.stalls_at_tai_s:
             self.stalls_at_tai_s = float("inf")
-            await asyncio.sleep(0.35)
+            await asyncio.sleep(self.stall_s)
 
 
 def test_late_ticks_are_counted_and_skipped_never_sent_in_a_burst() -> None:
@@ -532,6 +533,20 @@ def test_late_ticks_are_counted_and_skipped_never_sent_in_a_burst() -> None:
     assert min(gaps_s) > 0.04
     assert sum(gap < 0.09 for gap in gaps_s) <= 1
     assert worst_error_deg(flight, T + 12.0, T + 24.0) < HOLD_DEG
+
+
+class NearlyMissing(Stalling):
+    """Wakes 80 ms late, once."""
+
+    stall_s = 0.08
+
+
+def test_after_a_tick_that_came_near_the_next_one_that_one_is_skipped_and_counted() -> None:
+    """P8."""
+    flight = climb(20.0, losses=[(12.0, 19.0)], make_clock=NearlyMissing)
+    assert flight.outcome is not None
+    assert flight.outcome.skipped_tick_count == 1
+    assert min(write_gaps_s(flight, T + 10.0)) > 0.09
 
 
 class Stepped(LoopClock):
