@@ -228,7 +228,6 @@ async def _run(
         loop.add_signal_handler(number, service.stop, number.name)
     control = ControlSocket(directory, service.answer)
     await control.open()
-    gc.collect()
     gc.freeze()  # a full collection over the start-up heap would stall a tick by tens of milliseconds
     sync = asyncio.create_task(clock.watch_synchronisation())
     try:
