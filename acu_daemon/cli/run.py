@@ -52,6 +52,7 @@ from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.protocol.sa3842 import address_byte
 
 STDERR = 2
+SNAPSHOT_TICKS = 5  # where no live line is drawn: a snapshot costs a tenth of a tick
 
 
 class LogLevel(StrEnum):
@@ -129,7 +130,7 @@ def command(
         job = make_job(target, coming, link, is_rehearsal=clock.is_rehearsal, end_tai_s=end_tai_s, carried=kept.carried)
         job = replace(job, control=replace(job.control, is_shadow=shadow))
         job = replace(job, arming=kept.arming, latch=kept.latch)
-        outcome = asyncio.run(_run(job, link, clock, live, recording, SnapshotFile(directory, files), kept, directory))
+        outcome = asyncio.run(_run(job, link, clock, live, recording, files, kept, directory))
         structlog.get_logger("run").info("run.done", **asdict(outcome))
     if (
         outcome.has_begun
@@ -200,12 +201,14 @@ async def _run(
     clock: SystemClock,
     live: LiveLine | None,
     recording: RecordingWriter | None,
-    snapshots: SnapshotFile,
+    files: Writer,
     kept: Kept,
     directory: Path,
 ) -> Outcome:
     notifier = Notifier()
     health = Health(notifier)
+    snapshot_ticks = SNAPSHOT_TICKS if live is None else 1
+    snapshots = SnapshotFile(directory, files, snapshot_ticks)
 
     def show(seen: Snapshot) -> None:
         health.see(seen)
@@ -219,6 +222,7 @@ async def _run(
         clock,
         ProcessFitRunner(job.refit),
         on_snapshot=show,
+        snapshot_ticks=snapshot_ticks,
         on_reading=recording.add if recording else None,
         on_fit=kept.offer,
         on_state=kept.see,

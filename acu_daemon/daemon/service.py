@@ -80,6 +80,7 @@ class Service:
         runner: FitRunner,
         *,
         on_snapshot: Callable[[Snapshot], None] | None = None,
+        snapshot_ticks: int = 1,
         on_reading: Callable[[Reading], None] | None = None,
         on_fit: Callable[[FitResult], None] | None = None,
         on_state: Callable[[ControlState], None] | None = None,
@@ -88,6 +89,7 @@ class Service:
         self._clock = clock
         self._runner = runner
         self._on_snapshot = on_snapshot
+        self._snapshot_ticks = snapshot_ticks
         self._on_state = on_state
         self._ticked = asyncio.Event()
         self._stop_reason = ""
@@ -208,7 +210,7 @@ class Service:
         self._ticked.set()
         if self._on_state is not None:
             self._on_state(self._area.state)
-        if self._on_snapshot is not None:
+        if self._on_snapshot is not None and self._foreground.tick_count % self._snapshot_ticks == 0:
             self._on_snapshot(self.snapshot())
 
     def snapshot(self) -> Snapshot:

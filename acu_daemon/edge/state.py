@@ -60,7 +60,9 @@ EVERY_TICKS = 10
 class SnapshotFile:
     """The daemon's present view, once a second, for health checks and scripts.  The loop never waits for the disk."""
 
-    def __init__(self, directory: Path, writer: Writer) -> None:
+    def __init__(self, directory: Path, writer: Writer, snapshot_ticks: int = 1) -> None:
+        """snapshot_ticks: a snapshot comes every so many ticks."""
+        self._every_count = EVERY_TICKS // snapshot_ticks
         self._path = directory / SNAPSHOT
         self._unfinished = directory / f".{SNAPSHOT}.{os.getpid()}"
         self._latest: Latest[DataclassInstance] = Latest(writer, self._save)
@@ -68,8 +70,8 @@ class SnapshotFile:
         self.failed_count = 0
 
     def write(self, seen: "DataclassInstance") -> None:
-        """Take the snapshot of a tick."""
-        self._skip = (self._skip + 1) % EVERY_TICKS
+        """Take a snapshot."""
+        self._skip = (self._skip + 1) % self._every_count
         if self._skip == 0:
             self._latest.offer(seen)
 
