@@ -67,6 +67,7 @@ class Foreground:
         self._doubt_again_s = -math.inf
         self._seen = Observation()
         self._requests: tuple[Request, ...] = ()
+        self._connect_count = 0
         self._log: Any = structlog.get_logger("tick")
         self.identity: Identity | None = None
         self.tick_count = 0
@@ -137,7 +138,10 @@ class Foreground:
         self._requests = (*self._requests, request)
 
     def _silence_s(self) -> float:
-        return self._port.silence_s if self._port.is_up else math.inf
+        """On another connection than before, however soon it came, everything is read again before it is commanded."""
+        before, self._connect_count = self._connect_count, self._port.connect_count
+        is_another = before != self._connect_count and self._area.state.stage is not Stage.NEW
+        return self._port.silence_s if self._port.is_up and not is_another else math.inf
 
     async def _do(self, command: Command) -> bool:
         """One exchange; what it brings is gathered for the next decision.  A NAK is followed by a poll at once.
