@@ -5,15 +5,16 @@ import pytest
 from conftest import DATA, needs_data
 from hypothesis import given
 from hypothesis import strategies as st
+from made_oems import iss
 from skyfield.api import EarthSatellite, load, wgs84
 
 from acu_daemon.model import EarthOrientation, Site, Station, sky_angle_deg
 from acu_daemon.orbit.frames import itrs_from_teme, station_itrs_m, teme_from_itrs
-from acu_daemon.orbit.look import look, look_at
+from acu_daemon.orbit.look import look, look_along, look_at
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator
 from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.orbit.tle import parse_tle
-from acu_daemon.units import EARTH_RATE_RAD_S
+from acu_daemon.units import EARTH_RATE_RAD_S, wrap_180_array
 
 SKYFIELD_DEG = 0.002
 SKYFIELD_DEG_S = 1e-5
@@ -113,3 +114,13 @@ def test_exactly_overhead_everything_stays_finite() -> None:
     seen = look(r_itrs_m[None, :], np.array([[7e3, 0.0, 0.0]]), station)
     assert seen.el_deg[0] == pytest.approx(90.0)
     assert np.isfinite([seen.az_deg[0], seen.az_rate_deg_s[0], seen.el_rate_deg_s[0]]).all()
+
+
+def test_a_stretch_of_path_is_interpolated_to_some_decimetres() -> None:
+    source, site = iss(), Site(STATION)
+    tai_s = source.epoch_tai_s + 0.1 * np.arange(1200.0)
+    seen, along = look_at(source, tai_s, site), look_along(source, tai_s, site)
+    east_deg = wrap_180_array(along.az_deg - seen.az_deg) * np.cos(np.radians(seen.el_deg))
+    off_m = np.radians(np.hypot(east_deg, along.el_deg - seen.el_deg)) * seen.range_m
+    assert off_m.max() < 0.3
+    assert np.abs(along.el_rate_deg_s - seen.el_rate_deg_s).max() < 1e-5

@@ -3,6 +3,7 @@
 Commands go through the same encoders as readings, so biases that a fit found belong into the commands.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -26,15 +27,17 @@ from acu_daemon.units import DEG, Array
 _SIGMA_STEP_S = 5.0
 
 
-def encoder_look(propagator: Propagator, tai_s: Array, site: Site, fit: FitResult | None) -> Look:
+def encoder_look(
+    propagator: Propagator, tai_s: Array, site: Site, fit: FitResult | None, look: Callable[..., Look] = look_at
+) -> Look:
     """What the encoders show when the antenna points at the satellite, at the times (N,).
 
-    propagator: already corrected by the fit.  Without a fit this is `look_at`.
+    propagator: already corrected by the fit.  look: `look_at`, which it is without a fit, or `look_along`.
     Raises:  OrbitError: the propagator has no answer for one of the times.
     """
     if fit is None:
-        return look_at(propagator, tai_s, site)
-    seen = look_at(propagator, tai_s, moved_site(site, fit.station_shift_enu_m))
+        return look(propagator, tai_s, site)
+    seen = look(propagator, tai_s, moved_site(site, fit.station_shift_enu_m))
     return seen if fit.bias == AngleBias() else _biased(seen, fit.bias)
 
 

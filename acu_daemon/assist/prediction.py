@@ -6,6 +6,7 @@ import numpy as np
 
 from acu_daemon.assist.encoder import encoder_look, sigma_deg
 from acu_daemon.model import FitResult, Prediction, PredictionKind, Site
+from acu_daemon.orbit.look import look_along
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import Array, wrap_180, wrap_180_array
 
@@ -44,7 +45,7 @@ def predict(
     """
     before = round(lead_in_s / step_s)
     tai_s = start_tai_s + step_s * np.arange(-before, round(horizon_s / step_s) + 1, dtype=np.float64)
-    seen = encoder_look(propagator, tai_s, site, fit)
+    seen = encoder_look(propagator, tai_s, site, fit, look_along)
     az_deg = _continuous(seen.az_deg, seen.az_rate_deg_s, step_s)
     az_deg += near_az_deg + wrap_180(float(seen.az_deg[before]) - near_az_deg) - az_deg[before]
     follow_az_deg, follow_az_rate_deg_s = follow(az_deg, seen.az_rate_deg_s, step_s)

@@ -7,9 +7,11 @@ import numpy as np
 
 from acu_daemon.model import Site, Station
 from acu_daemon.orbit.frames import enu_from_itrs, itrs_from_teme, station_itrs_m
+from acu_daemon.orbit.hermite import HermiteTable
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import DEG, Array
 
+NODE_S = 30.0  # between the states of a stretch of path; what is interpolated between is good to 0.1 m
 _ZENITH_M2 = 1e-12  # keeps azimuth and its rate finite (0) exactly overhead, where neither exists
 
 
@@ -57,3 +59,15 @@ def look_at(propagator: Propagator, tai_s: Array, site: Site) -> Look:
     """
     r_teme_m, v_teme_m_s = propagator.states_teme(tai_s)
     return look(*itrs_from_teme(r_teme_m, v_teme_m_s, tai_s, site.orientation), site.station)
+
+
+def look_along(propagator: Propagator, tai_s: Array, site: Site) -> Look:
+    """The same at rising times (N,) that lie close: the orbit is computed at a few of them and interpolated between.
+
+    Raises:  OrbitError: the propagator has no answer for one of the times.
+    """
+    nodes = np.linspace(tai_s[0], tai_s[-1], max(4, 2 + int((tai_s[-1] - tai_s[0]) / NODE_S)))
+    if nodes.size >= tai_s.size:
+        return look_at(propagator, tai_s, site)
+    table = HermiteTable(nodes, *itrs_from_teme(*propagator.states_teme(nodes), nodes, site.orientation))
+    return look(*table.states(tai_s), site.station)
