@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from acu_daemon.protocol.angles import azimuth_code, azimuth_deg, clamp_code, clamp_deg, elevation_code, elevation_deg
 from acu_daemon.protocol.exchange import HostExchange
-from acu_daemon.protocol.frame import MAX_DATA_BYTES, STX, BadFrame, Frame, FrameDecoder, encode_frame
+from acu_daemon.protocol.frame import ACK, MAX_DATA_BYTES, NAK, STX, BadFrame, Frame, FrameDecoder, encode_frame
 from acu_daemon.protocol.messages import (
     Ack,
     AcuMode,
@@ -42,6 +42,7 @@ from acu_daemon.protocol.sa3842 import (
 )
 
 LSB_DEG = 360 / 65536
+STARTS = bytes((ACK, NAK))
 STATUS = Status(45.0, 22.5, AcuMode.REMOTE)
 angles_deg = st.floats(-720.0, 720.0, allow_nan=False)
 codes = st.integers(0, 0xFFFF)
@@ -56,6 +57,28 @@ commands = st.one_of(
 def cut(data: bytes, places: list[int]) -> list[bytes]:
     edges = [0, *sorted(place % (len(data) + 1) for place in places), len(data)]
     return [data[a:b] for a, b in pairwise(edges)]
+
+
+framed = st.builds(
+    lambda start, address, cmd, data: encode_frame(Frame(start, address, cmd, data)),
+    st.sampled_from((STX, ACK, NAK)),
+    st.sampled_from((0x30, 0x31, 0x6F, 0x70)),
+    st.sampled_from((0x2F, 0x30, 0x41, 0x7F, 0x80)),
+    st.lists(st.sampled_from((0x03, 0x06, 0x1F, 0x20, 0x41, 0x7F, 0x80)), max_size=3).map(bytes)
+    | st.sampled_from((b"A" * MAX_DATA_BYTES, b"A" * (MAX_DATA_BYTES + 1))),
+)
+
+
+@given(framed, st.binary(max_size=2), st.none() | st.tuples(st.integers(0, 200), st.integers(0, 255)))
+def test_what_comes_at_once_is_what_comes_byte_by_byte(
+    frame: bytes, after: bytes, change: tuple[int, int] | None
+) -> None:
+    data = bytearray(frame + after)
+    if change is not None:
+        data[change[0] % len(data)] = change[1]
+    at_once, byte_by_byte = FrameDecoder(STARTS), FrameDecoder(STARTS)
+    assert at_once.feed(bytes(data)) == [event for byte in data for event in byte_by_byte.feed(bytes((byte,)))]
+    assert at_once.is_idle == byte_by_byte.is_idle
 
 
 @given(st.lists(commands, max_size=4), st.lists(st.integers(0, 200)))
