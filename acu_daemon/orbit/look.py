@@ -7,11 +7,10 @@ import numpy as np
 
 from acu_daemon.model import Site, Station
 from acu_daemon.orbit.frames import enu_from_itrs, itrs_from_teme, station_itrs_m
-from acu_daemon.orbit.hermite import HermiteTable
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import DEG, Array
 
-NODE_S = 30.0  # between the states of a stretch of path; what is interpolated between is good to 0.1 m
+NODE_S, LEAST_NODES = 20.0, 8  # the orbit between: to 1 mm, as near as the times themselves are rounded
 _ZENITH_M2 = 1e-12  # keeps azimuth and its rate finite (0) exactly overhead, where neither exists
 
 
@@ -62,12 +61,32 @@ def look_at(propagator: Propagator, tai_s: Array, site: Site) -> Look:
 
 
 def look_along(propagator: Propagator, tai_s: Array, site: Site) -> Look:
-    """The same at rising times (N,) that lie close: the orbit is computed at a few of them and interpolated between.
+    """The same at rising times (N,) that lie close: the orbit is computed at a few instants and interpolated between.
 
     Raises:  OrbitError: the propagator has no answer for one of the times.
     """
-    nodes = np.linspace(tai_s[0], tai_s[-1], max(4, 2 + int((tai_s[-1] - tai_s[0]) / NODE_S)))
-    if nodes.size >= tai_s.size:
+    node_count = LEAST_NODES + int((tai_s[-1] - tai_s[0]) / NODE_S)
+    if node_count >= tai_s.size:
         return look_at(propagator, tai_s, site)
-    table = HermiteTable(nodes, *itrs_from_teme(*propagator.states_teme(nodes), nodes, site.orientation))
-    return look(*table.states(tai_s), site.station)
+    middle_s, half_s = (tai_s[-1] + tai_s[0]) / 2.0, (tai_s[-1] - tai_s[0]) / 2.0
+    points = -np.cos(np.linspace(0.0, np.pi, node_count))
+    nodes = np.clip(middle_s + half_s * points, tai_s[0], tai_s[-1])
+    shares = _interpolation((tai_s - middle_s) / half_s, points)
+    r_m, v_m_s = itrs_from_teme(*propagator.states_teme(nodes), nodes, site.orientation)
+    return look(shares @ r_m, shares @ v_m_s, site.station)
+
+
+def _interpolation(x: Array, points: Array) -> Array:
+    """Weights (N, K) of values at Chebyshev points (K,), ends included, for the polynomial through them at x (N,).
+
+    Source:  Berrut and Trefethen, Barycentric Lagrange Interpolation, SIAM Review 46 (2004), eq 4.2 and section 5.
+    """
+    weights = np.where(np.arange(points.size) % 2, -1.0, 1.0)
+    weights[[0, -1]] /= 2.0
+    gap = x[:, None] - points
+    is_point = gap == 0.0
+    terms = weights / np.where(is_point, 1.0, gap)
+    shares: Array = terms / terms.sum(axis=1, keepdims=True)
+    is_exact = is_point.any(axis=1)
+    shares[is_exact] = is_point[is_exact]
+    return shares
