@@ -5,7 +5,7 @@ import time
 
 __version__ = "0.1.0"
 
-for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):  # numpy reads them; more cost a refit a third of its time
+for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):  # numpy reads them; more cost a refit a tenth of its time
     os.environ.setdefault(_threads, "1")
 
 PROCESS_START_S = time.monotonic()  # as early as this program can know it: `--at` counts from here

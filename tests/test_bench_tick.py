@@ -1,5 +1,6 @@
 """The tick bench: that it measures what it says, and how its tables judge; never how fast anything was."""
 
+import json
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -76,7 +77,7 @@ def test_memory_and_processor_time_of_a_process_are_read() -> None:
 
 
 @pytest.mark.realtime
-@pytest.mark.parametrize(("name", "antennas"), [("polled", 1), ("idle", 2)])
+@pytest.mark.parametrize(("name", "antennas"), [("polled", 1), ("fifo", 2)])
 def test_a_few_seconds_of_a_locked_daemon_are_measured(tmp_path: Path, name: str, antennas: int) -> None:
     ticks = tick_rig.run_condition(tmp_path, tick_rig.CONDITIONS[name], antennas, 3.0, lambda _: None)
     assert ticks.tick_count + ticks.skipped_tick_count == pytest.approx(30 * antennas, abs=10 * antennas)
@@ -85,3 +86,6 @@ def test_a_few_seconds_of_a_locked_daemon_are_measured(tmp_path: Path, name: str
     assert (ticks.status_count > 0) == (name == "polled")
     assert ticks.limit_max_ms > 0.0
     assert ticks.memory_mb > 0.0
+    starts = [json.loads(log.read_text().splitlines()[0]) for log in tmp_path.glob("*/daemon.jsonl")]
+    expected = "SCHED_FIFO 30" if name == "fifo" and ticks.is_permitted else "SCHED_OTHER"
+    assert [(start["event"], start["scheduling"]) for start in starts] == antennas * [("run.start", expected)]
