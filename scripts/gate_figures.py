@@ -6,7 +6,7 @@
     .venv/bin/python scripts/gate_figures.py --first-locks      first locks on a side lobe, without AGC
 
 A minute of lock, a bad minute, and a prediction of the rest of the pass, 300 s at most.  Change: the largest angle
-between that prediction and the one from the good minute alone.  Without the gate all readings go to `full`, whose
+between that prediction and the daemon's from the good minute alone.  Without the gate all readings go to `full`, whose
 robust weights are all that is left.  Right: the share of the bad readings left out for the reason expected; good lost:
 the share of the good ones left out, 20 s after the bad minute among them.
 """
@@ -213,7 +213,8 @@ def measure(place: Place, kind: Kind, hz: float, seed: int) -> Figures:
         offered, acquired = locks(readings, t, kind.dwell_s)
         seen = acquired.part(acquired.tai_s <= end_tai_s)
         dwelt_count = len(seen) - int(np.count_nonzero(offered.tai_s <= end_tai_s))
-    reference = plain(place, offered.part(offered.tai_s < readings.tai_s[bad][0]))
+    good = offered.part(offered.tai_s < readings.tai_s[bad][0])
+    reference, _ = fitted(gated(place, good, settings), place, float(good.tai_s[-1]))
     fit, counts = fitted(gated(place, offered.part(offered.tai_s <= end_tai_s), settings), place, end_tai_s)
     counts[DWELL] = dwelt_count
     bad_count = dwelt_count if kind.dwell_s else int(np.count_nonzero(bad))

@@ -214,7 +214,7 @@ def w_at(at_s: float, seen: list[int]):
     return (at_s, lambda stage: seen.append(parameter_w(stage.acu)))
 
 
-def test_the_register_watchdog_is_set_for_the_pass_again_after_a_power_cycle_and_cleared_at_the_end() -> None:
+def test_p4_the_register_watchdog_is_set_for_the_pass_again_after_a_power_cycle_and_cleared_at_the_end() -> None:
     codes: list[int] = []
     power_cycle = (12.05, lambda stage: stage.acu.power_cycle(stage.clock.tai_s()))
     flight = climb(25.0, make_acu=Kept, script=[w_at(5.0, codes), power_cycle, w_at(12.06, codes), w_at(20.0, codes)])
@@ -223,7 +223,7 @@ def test_the_register_watchdog_is_set_for_the_pass_again_after_a_power_cycle_and
     assert state_at(flight, T + 25.0) == "AUTOTRACK/FITTED"
 
 
-def test_a_silent_host_in_a_loss_is_stopped_by_the_acu_and_a_new_link_goes_on() -> None:
+def test_p4_a_silent_host_in_a_loss_is_stopped_by_the_acu_and_a_new_link_goes_on() -> None:
     def cut(is_cut: bool):
         return lambda stage: setattr(stage.link, "is_cut", is_cut)
 
@@ -235,7 +235,7 @@ def test_a_silent_host_in_a_loss_is_stopped_by_the_acu_and_a_new_link_goes_on() 
     assert worst_error_deg(flight, T + 32.0, T + 43.0) < HOLD_DEG
 
 
-def test_a_watchdog_left_on_by_a_predecessor_hurts_nothing() -> None:
+def test_p4_a_watchdog_left_on_by_a_predecessor_hurts_nothing() -> None:
     def left(stage: Stage) -> None:
         stage.acu.answer(WriteParameter("W", 50))
 

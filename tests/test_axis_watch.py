@@ -46,21 +46,21 @@ def ticks(seconds: float) -> list[float]:
 
 
 @pytest.mark.parametrize("rate_deg_s", [0.3, 2.0, 20.0, -5.0])
-def test_an_axis_that_stands_still_is_found_two_seconds_after_its_command_left_it_by_a_degree(rate_deg_s) -> None:
+def test_p6_an_axis_that_stands_still_is_found_two_seconds_after_its_command_left_it_by_a_degree(rate_deg_s) -> None:
     found = follow([min(rate_deg_s * t, 10.0) for t in ticks(10.0)], [0.0 for _ in ticks(10.0)])
     assert found is not None
     assert found.text == "stands still away from its command"
     assert found.after_s == pytest.approx(1.0 / abs(rate_deg_s) + 2.0, abs=0.25)
 
 
-def test_an_axis_that_turns_the_wrong_way_is_found_within_a_few_degrees() -> None:
+def test_p6_an_axis_that_turns_the_wrong_way_is_found_within_a_few_degrees() -> None:
     found = follow([0.5 * t for t in ticks(20.0)], [-0.5 * 5.0 * max(t - 3.0, 0.0) ** 2 for t in ticks(20.0)])
     assert found is not None
     assert found.text == "moves away from its command"
     assert abs(found.angle_deg) < 15.0
 
 
-def test_an_axis_that_runs_away_from_a_command_that_stands_is_found() -> None:
+def test_p6_an_axis_that_runs_away_from_a_command_that_stands_is_found() -> None:
     found = follow([0.0 for _ in ticks(20.0)], [3.0 * t for t in ticks(20.0)])
     assert found is not None
     assert found.text == "moves away from its command"
@@ -68,14 +68,14 @@ def test_an_axis_that_runs_away_from_a_command_that_stands_is_found() -> None:
 
 
 @pytest.mark.parametrize("rate_deg_s", [0.8, 5.0, -20.0])
-def test_an_axis_that_moves_in_a_mode_that_moves_nothing_is_found(rate_deg_s) -> None:
+def test_p6_an_axis_that_moves_in_a_mode_that_moves_nothing_is_found(rate_deg_s) -> None:
     found = judge([0.0] * 30 + [rate_deg_s * t for t in ticks(20.0)], [None] * 230, Duty.STAND)
     assert found is not None
     assert found.text == "moves without a command"
     assert found.after_s < 3.0 + 6.0
 
 
-def test_an_axis_faster_than_any_drive_is_found_in_autotrack_too() -> None:
+def test_p6_an_axis_faster_than_any_drive_is_found_in_autotrack_too() -> None:
     found = judge([60.0 * t for t in ticks(5.0)], [None] * 50, Duty.FREE)
     assert found is None  # each step is an encoder's jump
     found = judge([42.5 * t for t in ticks(5.0)], [None] * 50, Duty.FREE)
@@ -103,7 +103,7 @@ def obeying(commands_deg: list[float], limits: AxisLimits) -> list[float]:
     ],
     ids=["half a turn", "keyhole", "slow path", "to and fro"],
 )
-def test_a_drive_that_does_what_it_can_is_left_alone(commands_deg, share) -> None:
+def test_p6_a_drive_that_does_what_it_can_is_left_alone(commands_deg, share) -> None:
     drive = AxisLimits(-270.0, 270.0, 20.0 * share, 10.0 * max(share, 0.5))
     assert follow(commands_deg, obeying(commands_deg, drive)) is None
 
@@ -122,7 +122,7 @@ def test_a_stop_from_full_speed_may_take_its_way() -> None:
 
 
 @given(st.integers(5, 90), st.floats(-360.0, 360.0))
-def test_one_wild_or_frozen_reading_moves_no_axis(at, jump_deg) -> None:
+def test_p6_one_wild_or_frozen_reading_moves_no_axis(at, jump_deg) -> None:
     path = [0.8 * t for t in ticks(10.0)]
     wild = [angle + (jump_deg if k == at else 0.0) for k, angle in enumerate(path)]
     frozen = [path[k - 1] if k == at else angle for k, angle in enumerate(path)]

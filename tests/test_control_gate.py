@@ -32,7 +32,7 @@ def at(az_deg: float, el_deg: float, az_rate: float = 0.0, el_rate: float = 0.0)
 
 
 @given(any_angle, any_angle, any_angle, any_angle, st.booleans())
-def test_what_passes_is_always_finite_and_within_the_limits(az, el, az_rate, el_rate, is_followed):
+def test_p5_what_passes_is_always_finite_and_within_the_limits(az, el, az_rate, el_rate, is_followed):
     passed = gate(
         Pointing(az, el, az_rate, el_rate), at(100.0, 45.0), 0.0, is_followed=is_followed, dt_s=DT_S, config=CONFIG
     )
@@ -41,7 +41,7 @@ def test_what_passes_is_always_finite_and_within_the_limits(az, el, az_rate, el_
 
 
 @given(st.floats(-270, 270), st.floats(0, 90), st.lists(st.tuples(st.floats(-270, 270), st.floats(0, 90)), max_size=20))
-def test_followed_registers_never_move_faster_than_the_axis(az, el, targets):
+def test_p5_followed_registers_never_move_faster_than_the_axis(az, el, targets):
     state = at(az, el)
     for target_az, target_el in targets:
         passed = gate(Pointing(target_az, target_el, 0.0, 0.0), state, 0.0, is_followed=True, dt_s=DT_S, config=CONFIG)

@@ -172,7 +172,7 @@ def test_a_search_without_success_goes_back_to_the_path_and_searches_again() -> 
 # The link
 
 
-def test_a_silent_link_is_lost_after_half_a_second_and_asked_anew_before_anything_is_commanded() -> None:
+def test_p2_p3_a_silent_link_is_lost_after_half_a_second_and_asked_anew_before_anything_is_commanded() -> None:
     flight = climb(40.0, losses=[(12.0, 38.0)], script=[(15.0, cut(True)), (20.0, cut(False))])
     assert seconds_to_state(flight, "LINK-LOST", T + 15.0) == pytest.approx(0.55, abs=0.16)
     back_s = seconds_to_state(flight, "IDLE", T + 20.0)
@@ -195,7 +195,7 @@ def test_a_link_that_is_hung_up_comes_back_at_once_and_autotrack_is_left_alone()
     assert worst_error_deg(flight, T + 10.0, T + 29.9) < HOLD_DEG
 
 
-def test_a_long_silence_ends_within_two_seconds_of_its_cause() -> None:
+def test_p3_a_long_silence_ends_within_two_seconds_of_its_cause() -> None:
     flight = climb(60.0, script=[(12.0, cut(True)), (45.0, cut(False))])
     assert seconds_to_state(flight, "AUTOTRACK/FITTED", T + 45.0) < 3.0
 
@@ -255,7 +255,7 @@ def test_under_the_local_panel_it_only_polls_and_comes_back_when_it_may() -> Non
 
 
 @pytest.mark.parametrize("losses", [[], [(12.0, 39.0)]], ids=["tracking", "lost"])
-def test_after_a_power_cycle_of_the_acu_it_is_on_the_satellite_again_within_seconds(
+def test_p3_after_a_power_cycle_of_the_acu_it_is_on_the_satellite_again_within_seconds(
     losses: list[tuple[float, float]],
 ) -> None:
     flight = climb(40.0, losses=losses, script=[(15.05, acu_does(lambda acu, now: acu.power_cycle(now)))])
@@ -311,7 +311,7 @@ def test_an_antenna_found_stowed_is_taken_out_for_the_pass() -> None:
 
 
 @pytest.mark.parametrize("mode", ["standby", "remote"])
-def test_however_the_acu_was_left_nothing_moves_before_its_registers_are_known(mode: str) -> None:
+def test_p1_however_the_acu_was_left_nothing_moves_before_its_registers_are_known(mode: str) -> None:
     antenna = AcuChoice(azimuth_deg=100.0, elevation_deg=60.0, mode=mode)  # type: ignore[arg-type]
     flight = climb(2.0, antenna=antenna, noise_deg=0.0)
     planned = next(i for i, (_, command) in enumerate(flight.commands) if isinstance(command, WriteAndPoll))
@@ -385,7 +385,7 @@ def test_the_tilt_register_is_sent_back_unchanged() -> None:
     assert {command.tilt_code for command in sent} == {364}
 
 
-def test_disarmed_nothing_is_ever_commanded() -> None:
+def test_p1_disarmed_nothing_is_ever_commanded() -> None:
     flight = climb(20.0, demo_target(safety={"arm": "manual"}))
     assert count(flight, (*ORDERS, Stop)) == 0
     assert count(flight, Poll) > 150
@@ -486,7 +486,7 @@ def write_gaps_s(flight: Flight, from_tai_s: float) -> list[float]:
     return [b - a for a, b in zip(times, times[1:], strict=False)]
 
 
-def test_a_fit_that_fails_disturbs_no_tick_and_is_logged() -> None:
+def test_p9_a_fit_that_fails_disturbs_no_tick_and_is_logged() -> None:
     flight = climb(30.0, losses=[(15.0, 25.0)], make_runner=Failing)
     assert write_gaps_s(flight, T + 2.0) == pytest.approx([TICK_S] * len(write_gaps_s(flight, T + 2.0)), abs=1e-3)
     assert events_named(flight, "fit.failed")
@@ -501,7 +501,7 @@ def test_a_fit_that_always_fails_is_not_asked_more_than_twice_a_second() -> None
     assert 10 <= flight.outcome.refit_failed_count <= 42
 
 
-def test_a_fit_that_answers_late_disturbs_no_tick() -> None:
+def test_p9_a_fit_that_answers_late_disturbs_no_tick() -> None:
     flight = climb(40.0, losses=[(25.0, 35.0)], make_runner=Slow)
     gaps_s = write_gaps_s(flight, T + 8.0)
     assert gaps_s == pytest.approx([TICK_S] * len(gaps_s), abs=1e-3)
@@ -524,7 +524,7 @@ class Stalling(LoopClock):
             await asyncio.sleep(self.stall_s)
 
 
-def test_late_ticks_are_counted_and_skipped_never_sent_in_a_burst() -> None:
+def test_p8_late_ticks_are_counted_and_skipped_never_sent_in_a_burst() -> None:
     flight = climb(25.0, losses=[(12.0, 24.0)], make_clock=Stalling)
     assert flight.outcome is not None
     assert flight.outcome.skipped_tick_count == 3
@@ -541,7 +541,7 @@ class NearlyMissing(Stalling):
     stall_s = 0.08
 
 
-def test_after_a_tick_that_came_near_the_next_one_that_one_is_skipped_and_counted() -> None:
+def test_p8_after_a_tick_that_came_near_the_next_one_that_one_is_skipped_and_counted() -> None:
     """P8."""
     flight = climb(20.0, losses=[(12.0, 19.0)], make_clock=NearlyMissing)
     assert flight.outcome is not None
@@ -556,7 +556,7 @@ class Stepped(LoopClock):
         return 3.0 if T + 12.0 < self.tai_s() < T + 20.0 else 0.0001
 
 
-def test_a_step_of_the_system_clock_is_reported_once_and_not_obeyed() -> None:
+def test_p7_a_step_of_the_system_clock_is_reported_once_and_not_obeyed() -> None:
     flight = climb(25.0, losses=[(10.0, 24.0)], make_clock=Stepped)
     [event] = events_named(flight, "clock.stepped")
     assert event["difference_s"] == 3.0

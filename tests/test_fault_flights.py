@@ -18,7 +18,7 @@ UNHARMED = {"silence"}  # the loss itself, in every flight
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_a_fault_is_shown_survived_and_the_path_taken_up_again(name: str) -> None:
+def test_p2_p3_p5_p8_a_fault_is_shown_survived_and_the_path_taken_up_again(name: str) -> None:
     """P2, P3, P5, P8: no command outside the envelope, none in a burst, none stale; on the path again in time."""
     case, seen = CASES[name], measure(name)
     assert [state for state in seen.states if state in case.shows] == list(case.shows)
@@ -30,7 +30,7 @@ def test_a_fault_is_shown_survived_and_the_path_taken_up_again(name: str) -> Non
 
 
 @pytest.mark.parametrize("name", [name for name, case in CASES.items() if "LINK-LOST" in case.shows])
-def test_a_silent_link_is_shown_within_half_a_second(name: str) -> None:
+def test_p2_a_silent_link_is_shown_within_half_a_second(name: str) -> None:
     """P2."""
     assert seconds_to_state(flown(name), "LINK-LOST", T + CASES[name].from_s) <= LINK_LOST_S
 
@@ -39,7 +39,7 @@ LATCHES = [name for name, case in CASES.items() if case.clear_s is not None]
 
 
 @pytest.mark.parametrize("name", LATCHES)
-def test_a_latched_axis_is_stopped_and_told_nothing_until_a_person_clears_it(name: str) -> None:
+def test_p6_a_latched_axis_is_stopped_and_told_nothing_until_a_person_clears_it(name: str) -> None:
     """P6."""
     flight, cleared_s = flown(name), CASES[name].clear_s or 0.0
     latched_s = seconds_to_state(flight, "FAULT", T)
@@ -54,7 +54,7 @@ def test_a_latched_axis_is_stopped_and_told_nothing_until_a_person_clears_it(nam
 
 
 @pytest.mark.parametrize("name", sorted(CASES.keys() - set(LATCHES)))
-def test_no_passing_fault_latches_an_axis(name: str) -> None:
+def test_p6_no_passing_fault_latches_an_axis(name: str) -> None:
     """P6."""
     assert "axis.latched" not in measure(name).events
 

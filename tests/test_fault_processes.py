@@ -185,7 +185,7 @@ def worst_error_deg(story: Story, from_tai_s: float, to_tai_s: float) -> float:
 
 
 @pytest.mark.parametrize("link", ["tcp", "pty"])
-def test_the_antenna_is_held_after_faults_of_the_line_and_the_machine(
+def test_p2_p3_the_antenna_is_held_after_faults_of_the_line_and_the_machine(
     stories: dict[str, "Future[Story]"], link: str
 ) -> None:
     """P2, P3: on the path when the signal comes back; that it is tracked then, the story has waited for."""
@@ -193,7 +193,7 @@ def test_the_antenna_is_held_after_faults_of_the_line_and_the_machine(
     assert worst_error_deg(story, story.marks_tai_s["held"], story.marks_tai_s["signal"]) <= IN_BEAM_DEG
 
 
-def test_an_adapter_that_comes_back_under_another_name_is_found_behind_its_by_id_link(
+def test_p3_an_adapter_that_comes_back_under_another_name_is_found_behind_its_by_id_link(
     stories: dict[str, "Future[Story]"],
 ) -> None:
     """P3."""
@@ -205,7 +205,7 @@ def test_an_adapter_that_comes_back_under_another_name_is_found_behind_its_by_id
 
 
 @pytest.mark.parametrize("link", ["tcp", "pty"])
-def test_nothing_is_ever_sent_in_a_burst(stories: dict[str, "Future[Story]"], link: str) -> None:
+def test_p2_p8_nothing_is_ever_sent_in_a_burst(stories: dict[str, "Future[Story]"], link: str) -> None:
     """P2, P8: not after a connection that was half open, not after a daemon that stood still under load."""
     times = np.array(stories[link].result().writes_tai_s)
     spans = times[BURST_COUNT:] - times[:-BURST_COUNT]
@@ -213,7 +213,7 @@ def test_nothing_is_ever_sent_in_a_burst(stories: dict[str, "Future[Story]"], li
     assert float(np.min(spans)) > BURST_S
 
 
-def test_a_daemon_that_stood_still_for_two_seconds_counts_the_ticks_and_goes_on(
+def test_p8_a_daemon_that_stood_still_for_two_seconds_counts_the_ticks_and_goes_on(
     stories: dict[str, "Future[Story]"],
 ) -> None:
     """P8."""

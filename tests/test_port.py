@@ -93,7 +93,7 @@ def test_a_refusal_is_an_answer() -> None:
     play(story)
 
 
-def test_a_silent_link_is_dropped_and_opened_again() -> None:
+def test_p2_a_silent_link_is_dropped_and_opened_again() -> None:
     async def story(port: AcuPort, link: MemoryLink, _clock: LoopClock) -> None:
         link.is_cut = True
         await port.exchange(Poll())
@@ -110,7 +110,7 @@ def test_a_silent_link_is_dropped_and_opened_again() -> None:
     play(story)
 
 
-def test_an_acu_that_another_client_holds_is_asked_again_each_second_and_the_reason_is_kept() -> None:
+def test_p3_an_acu_that_another_client_holds_is_asked_again_each_second_and_the_reason_is_kept() -> None:
     async def story(port: AcuPort, link: MemoryLink, _clock: LoopClock) -> None:
         link.is_refused = True
         link.hang_up()

@@ -88,7 +88,7 @@ def start(state: ControlState, acu: SmallAcu, config: ControlConfig = CONFIG, li
     return state
 
 
-def test_a_start_polls_identifies_reads_writes_the_present_angles_and_reads_them_back() -> None:
+def test_p1_a_start_polls_identifies_reads_writes_the_present_angles_and_reads_them_back() -> None:
     acu = SmallAcu()
     state = start(standing(), acu)
     assert acu.asked == [
@@ -124,7 +124,7 @@ def test_under_local_control_it_waits_before_the_first_write() -> None:
     assert start(remote, acu).stage is Stage.READY
 
 
-def test_without_any_status_nothing_is_written() -> None:
+def test_p1_without_any_status_nothing_is_written() -> None:
     acu = SmallAcu()
     assert start(ControlState(), acu).stage is Stage.REGISTERS_KNOWN
     assert acu.count == 0

@@ -132,7 +132,7 @@ def entries_of(text: bytes) -> list[dict[str, Any]]:
     return [json.loads(line) for line in text.splitlines(keepends=True) if line.endswith(b"\n")]
 
 
-def test_a_log_that_nobody_reads_stops_nobody_and_its_missing_lines_are_counted(
+def test_p8_a_log_that_nobody_reads_stops_nobody_and_its_missing_lines_are_counted(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     reader, fd = os.pipe()
@@ -156,7 +156,7 @@ def test_a_log_that_nobody_reads_stops_nobody_and_its_missing_lines_are_counted(
     os.close(reader)
 
 
-def test_a_file_is_replaced_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_p10_a_file_is_replaced_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "x"
     replace_file(path, b"old")
 
