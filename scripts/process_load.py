@@ -56,7 +56,7 @@ def busy_cores(count: int) -> Iterator[None]:
     """Keep so many cores busy."""
     with ExitStack() as ends:
         for _ in range(count):
-            process = ends.enter_context(subprocess.Popen(_BUSY))
+            process = ends.enter_context(subprocess.Popen(_BUSY, start_new_session=True))
             ends.callback(process.kill)
         yield
 
@@ -90,7 +90,7 @@ class MachineLimit:
                 "--histogram=100000",
                 *policy,
             ]
-        self._process = subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True)
+        self._process = subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True, start_new_session=True)
         if is_fifo:
             try_fifo(self._process.pid)
 
