@@ -87,7 +87,9 @@ def test_p1_a_stop_that_is_not_acknowledged_is_repeated_and_nothing_else_is_sent
 
 def test_p1_armed_again_it_begins_with_the_present_angles() -> None:
     state, _ = run(moving(), status(AcuMode.REMOTE_BACKUP), 10, requests=(Request.DISARM,))
-    state, orders = tick(state, saw(status(AcuMode.STANDBY), requests=(Request.ARM,)), FITTED, NOW + 5.0, GUARDED)
+    armed = saw(status(AcuMode.STANDBY), requests=(Request.ARM,))
+    armed = replace(armed, reading=replace(armed.reading, tai_s=NOW + 4.9))
+    state, orders = tick(state, armed, FITTED, NOW + 5.0, GUARDED)
     assert state.is_armed(GUARDED)
     assert state.stage is Stage.REGISTERS_KNOWN
     assert (orders.first, orders.extra) == (Poll(), ReadParameter("S"))
@@ -102,7 +104,7 @@ def test_p1_a_shadow_is_never_armed() -> None:
 
 
 def test_a_daemon_that_never_moved_anything_sends_no_stop_when_it_is_disarmed() -> None:
-    state = replace(ready(TrackState.IDLE, status(AcuMode.STANDBY)), stage=Stage.REGISTERS_KNOWN)
+    state = replace(ready(TrackState.IDLE, status(AcuMode.STANDBY)), stage=Stage.REGISTERS_KNOWN, in_force=None)
     _, sent = run(state, status(AcuMode.STANDBY), 10, requests=(Request.DISARM,))
     assert orders_of(sent) == []
 
@@ -180,8 +182,9 @@ def test_a_stop_by_another_hand_is_respected_until_a_person_arms(mode: AcuMode) 
     [
         status(AcuMode.STANDBY, backup_selected=Backup.RATE),
         status(AcuMode.STANDBY, has_interlock_fault=True),
+        status(AcuMode.STANDBY, is_remote_enabled=False),
     ],
-    ids=["power cycle", "fault or register watchdog"],
+    ids=["power cycle", "fault or register watchdog", "local panel"],
 )
 def test_standby_by_the_acus_own_doing_is_no_stop(seen: Status) -> None:
     state, _ = run(moving(), seen)
@@ -306,7 +309,9 @@ def test_an_acu_without_watchdog_is_told_once_and_tracked_all_the_same(reply) ->
     state, events, sent, last = ready(TrackState.AUTOTRACK_FITTED, seen), [], [], None
     for k in range(200):
         extra = Exchange(last, reply if getattr(last, "name", "") == "W" else Ack()) if last is not None else None
-        state, orders = tick(state, saw(seen, extra=extra), FITTED, NOW + 0.1 * k, GUARDED)
+        observed = saw(seen, extra=extra)
+        observed = replace(observed, reading=replace(observed.reading, tai_s=NOW + 0.1 * k - 0.09))
+        state, orders = tick(state, observed, FITTED, NOW + 0.1 * k, GUARDED)
         last = orders.extra
         events += [event.name for event in orders.events]
         sent.append(orders.extra)

@@ -71,7 +71,14 @@ def status(mode: AcuMode = AcuMode.AUTOTRACK, **changes: object) -> Status:
 
 def ready(track: TrackState, seen: Status) -> ControlState:
     """A daemon that started long ago."""
-    return ControlState(track=track, entered_tai_s=NOW - 50.0, stage=Stage.READY, status=seen, az_deg=AZ_DEG)
+    return ControlState(
+        track=track,
+        entered_tai_s=NOW - 50.0,
+        stage=Stage.READY,
+        status=seen,
+        az_deg=AZ_DEG,
+        in_force=(NOW - 0.1, AZ_DEG, EL_DEG),
+    )
 
 
 def saw(seen: Status, **changes: object) -> Observation:
@@ -241,9 +248,33 @@ def extras_over(refusal: Nak | None, span_s: float) -> int:
     state, sent, last = ready(TrackState.AUTOTRACK_FITTED, seen), 0, None
     for k in range(round(span_s * 10)):
         extra = Exchange(last, refusal) if last is not None else None
-        state, orders = tick(state, saw(seen, extra=extra), FITTED, NOW + 0.1 * k, CONFIG)
+        observed = saw(seen, extra=extra)
+        observed = replace(observed, reading=replace(observed.reading, tai_s=NOW + 0.1 * k - 0.09))
+        state, orders = tick(state, observed, FITTED, NOW + 0.1 * k, CONFIG)
         last, sent = orders.extra, sent + (orders.extra is not None)
     return sent
+
+
+def test_on_a_status_from_before_an_outage_nothing_is_decided() -> None:
+    seen = status(AcuMode.STANDBY)
+    stale = replace(ready(TrackState.HOLD_FITTED, seen), reading=saw(seen).reading)
+    for stage in (Stage.NEW, Stage.REGISTERS_KNOWN, Stage.SECTOR_FREE, Stage.READY):
+        _, orders = tick(replace(stale, stage=stage), Observation(), FITTED, NOW + LINK_SILENCE_S + 0.1, CONFIG)
+        assert orders.extra is None
+
+
+def test_no_mode_is_selected_while_the_registers_are_old() -> None:
+    seen = status(AcuMode.STANDBY, is_autotrack_selected=False)
+    state = replace(ready(TrackState.HOLD_FITTED, seen), entered_tai_s=NOW - 1.0, in_force=(NOW - 5.0, AZ_DEG, EL_DEG))
+    assert tick(state, saw(seen), FITTED, NOW, CONFIG)[1].extra is None
+    assert tick(replace(state, in_force=(NOW - 0.1, AZ_DEG, EL_DEG)), saw(seen), FITTED, NOW, CONFIG)[1].extra
+
+
+def test_autotrack_that_is_selected_in_standby_is_deselected_first_once_it_is_no_transient() -> None:
+    seen = status(AcuMode.STANDBY, is_autotrack_selected=True)
+    state = ready(TrackState.HOLD_FITTED, seen)
+    assert tick(state, saw(seen), FITTED, NOW, CONFIG)[1].extra == SelectMode(AcuMode.STANDBY)
+    assert tick(replace(state, extra_after_tai_s=NOW), saw(seen), FITTED, NOW, CONFIG)[1].extra is None
 
 
 def test_a_refused_extra_is_repeated_far_more_rarely_than_a_lost_one() -> None:

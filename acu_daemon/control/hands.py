@@ -62,11 +62,12 @@ def respect_stop(before: ControlState, state: ControlState, config: ControlConfi
     that went unwritten for a while.  before: the memory one tick ago.
     """
     was, now = before.status, state.status
-    if was is None or now is None or before.in_force is None or before.reading is None:
+    if was is None or now is None or before.in_force is None or state.reading is None:
         return state
     is_ours = state.is_armed(config) and not state.latch and state.stage is Stage.READY and state.track in ACTIVE
     is_stopped = was.mode in STOPPED_FROM and now.mode is AcuMode.STANDBY and now.backup_selected is Backup.REMOTE
-    is_served = before.reading.tai_s - before.in_force[0] < UNSERVED_S
+    is_stopped = is_stopped and now.is_remote_enabled  # else it is the local panel's, and ends with it
+    is_served = state.reading.tai_s - before.in_force[0] < UNSERVED_S
     if is_ours and is_stopped and is_served and _faults(now) == _faults(was):
         return _disarm(state, "another hand that stopped the antenna", events)
     return state

@@ -4,14 +4,15 @@ from acu_daemon.control.state import ControlState
 from acu_daemon.control.states import AUTOTRACKING, HOLDING, TrackState
 from acu_daemon.protocol.messages import AcuMode, Backup, Command, ReadFaults, SelectBackup, SelectMode
 
-STOW_LEAVES = SelectMode(AcuMode.STANDBY)  # the one mode command that the ACU takes in STOWED, ICD section 5
+STANDBY = SelectMode(AcuMode.STANDBY)  # the one mode command that the ACU takes in STOWED, ICD section 5
 UNDER_AUTOTRACK = AUTOTRACKING | HOLDING | {TrackState.ACQUIRE_TLE, TrackState.SEARCH}
 
 
-def wanted_mode_command(state: ControlState) -> Command | None:
+def wanted_mode_command(state: ControlState, *, is_settled: bool) -> Command | None:
     """The next command on the way to what the state needs; None when the ACU is there.
 
     The backup comes before the mode, and the registers are written before either (ICD section 5).
+    is_settled: nothing was commanded for a while, so that what the status says of the mode is no transient.
     """
     status = state.status
     if status is None:
@@ -20,8 +21,9 @@ def wanted_mode_command(state: ControlState) -> Command | None:
         return ReadFaults()
     if state.track is not TrackState.PREPOSITION and state.track not in UNDER_AUTOTRACK:
         return None
-    if status.mode is AcuMode.STOWED:
-        return STOW_LEAVES
+    is_stuck = status.mode is AcuMode.STANDBY and status.is_autotrack_selected  # selected again, it would not change
+    if status.mode is AcuMode.STOWED or (is_stuck and is_settled):
+        return STANDBY
     if status.backup_selected is not Backup.REMOTE:
         return SelectBackup(Backup.REMOTE)
     if state.track is TrackState.PREPOSITION:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from acu_daemon.control.absorb import absorb
 from acu_daemon.control.axis_watch import AxesWatch
-from acu_daemon.control.causes import find_causes, path_point
+from acu_daemon.control.causes import LINK_SILENCE_S, find_causes, path_point
 from acu_daemon.control.fence import fence
 from acu_daemon.control.gate import Passed, gate
 from acu_daemon.control.hands import last_command, let_be, obey, respect_stop, watch_antenna
@@ -32,6 +32,7 @@ from acu_daemon.pointing.wrap import nearest_turn
 from acu_daemon.protocol.messages import Command, Poll, WriteAndPoll
 
 EXTRA_REPEAT_S = 0.3  # a command gets this long to show in the status before it is sent again
+EXTRA_SETTLED_S = 0.7  # after that; a status that still contradicts itself means it
 SETTLE_S = 1.0  # after a change of state the servo takes up the path: what it is short of then is no lag
 CALM_SHARE = 0.25  # of the drive's rate: above it a lag is what the drive cannot do, not what it does late
 
@@ -131,14 +132,24 @@ def _is_sure(sky: Sky, now_tai_s: float, config: ControlConfig) -> bool:
 
 
 def _extra(state: ControlState, now_tai_s: float, config: ControlConfig) -> Command | None:
-    if state.status is None or not state.status.is_remote_enabled:
+    if state.status is None or not state.status.is_remote_enabled or state.reading is None:
         return None
-    wanted = last_command(state, config) or next_command(state, config)
-    if wanted is None and (state.stage is Stage.READY or state.track is TrackState.FAULT):
-        wanted = wanted_mode_command(state)
+    wanted = last_command(state, config)
+    if wanted is None and now_tai_s - state.reading.tai_s > LINK_SILENCE_S:
+        return None  # a status from before an outage: who knows where the antenna is now
+    wanted = wanted or next_command(state, config)
+    if wanted is None and (state.track is TrackState.FAULT or _are_registers_fresh(state, now_tai_s)):
+        wanted = wanted_mode_command(state, is_settled=now_tai_s - state.extra_after_tai_s > EXTRA_SETTLED_S)
     if wanted is None or (wanted == state.last_extra and now_tai_s < state.extra_after_tai_s):
         return None
     return wanted
+
+
+def _are_registers_fresh(state: ControlState, now_tai_s: float) -> bool:
+    """Whether a mode may be selected: the registers first, the mode second (ICD section 5)."""
+    if state.stage is not Stage.READY or state.in_force is None:
+        return False
+    return now_tai_s - state.in_force[0] < LINK_SILENCE_S
 
 
 def _remember(state: ControlState, extra: Command | None, now_tai_s: float) -> ControlState:

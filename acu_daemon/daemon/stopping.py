@@ -19,6 +19,7 @@ async def stop_antenna(port: AcuPort, status: Status, *, clears_watchdog: bool) 
     """
     log: Any = structlog.get_logger("stop")
     is_stopped = True
+    await port.idle_gap()
     if status.mode in NO_STOP_MODES or not status.is_remote_enabled:
         log.info("stop.left_alone", mode=status.mode.name)
     elif await _acknowledged(port, Stop()):
