@@ -15,6 +15,7 @@ only the latter counts.
 """
 
 import argparse
+import ctypes
 import gc
 import json
 import os
@@ -66,6 +67,7 @@ class PassSeen:
     refusal_count: int = 0
     rss_mb: float = 0.0
     object_count: int = 0
+    block_count: int = 0  # allocated by Python
     descriptor_count: int = 0
     cpu_s: float = 0.0
 
@@ -175,15 +177,16 @@ class Soak:
         rig = self.rig
         if self._is_quick:
             coming = coming_pass(rig.scene.target, self.now_tai_s)
-            rig.stall(max(0.0, coming.rise_tai_s - LEAD_S - self.now_tai_s))
+            rig.skip(max(0.0, coming.rise_tai_s - LEAD_S - self.now_tai_s))
         rig.start()
 
     def note_memory(self, seen: PassSeen) -> None:
-        """What the process holds now."""
+        """What the process holds now, without what the allocator keeps for later."""
         gc.collect()
+        ctypes.CDLL(None).malloc_trim(0)
         pages = int(Path("/proc/self/statm").read_text().split()[1])
         seen.rss_mb = round(pages * resource.getpagesize() / 1e6, 2)
-        seen.object_count = len(gc.get_objects())
+        seen.object_count, seen.block_count = len(gc.get_objects()), sys.getallocatedblocks()
         seen.descriptor_count = len(os.listdir("/proc/self/fd"))  # noqa: PTH208
 
 

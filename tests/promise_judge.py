@@ -33,7 +33,7 @@ SILENT_S = 0.7  # half a second, the tick that sees it, and its exchange
 STALE_S = 0.7  # a link is closed after half a second of silence: nothing older may arrive
 PRESENT_S, PRESENT_DEG = 2.5, 1.0  # the present angles are those of a status so old at most
 BURST_SHARE = 0.5  # of the period
-START_SHARE, GAP_S = 0.1, 0.15  # the first write ends a start within its tick, however late that is in the period
+START_SHARE = 0.1  # the first write ends a start within its tick, however late that is in the period
 FOLLOW_S_S = 0.0021  # seconds of a second by which UTC may follow the system's clock
 COUNT_SLACK = 4
 PATH_DEG, KEYHOLE_EL_DEG = 0.5, 80.0
@@ -63,7 +63,7 @@ class Judge:
 
     def started(self) -> None:
         self._started_s = self._heard_s = self._now_s
-        self._last_s, self._is_first = -1e18, False
+        self._last_s, self._is_first, self._is_starting = -1e18, False, False
         self._followed: tuple[float, float, float] | None = None
         self._clamped_count = 0
         self._offset_s = self._rig.daemon_clock.offset_s
@@ -145,7 +145,7 @@ class Judge:
         if not limits.min_deg - LSB_DEG <= el_deg <= limits.max_deg + LSB_DEG:
             self._break("P5", f"elevation {el_deg}")
         if isinstance(command, WriteRegisters):
-            self._is_present, self._followed = True, None
+            self._is_present, self._is_starting, self._followed = True, True, None
             if not self._is_of_a_report(az_deg, el_deg):
                 self._break("P2", f"first write {az_deg:.2f} {el_deg:.2f} is not where the antenna is")
             return
@@ -153,7 +153,7 @@ class Judge:
         gap_s = now_s - self._last_s
         if gap_s < (START_SHARE if self._is_first else BURST_SHARE) * period_s - 1e-6:
             self._break("P8", f"two writes {1e3 * gap_s:.1f} ms apart")
-        self._is_first = gap_s > GAP_S
+        self._is_first, self._is_starting = self._is_starting, False
         self._last_s = now_s
         self._judge_rate(az_deg, el_deg)
         self._judge_path(az_deg, el_deg)

@@ -44,6 +44,7 @@ from acu_daemon.sim.scenario import AcuChoice, Encoder, Scenario
 from acu_daemon.sim.sky import Sky
 from acu_daemon.sim.virtual import VirtualTimeLoop
 
+STALL_LEAD_S = 0.001
 RESTART_S = 0.1  # RestartSec of the unit
 FIT_TIMEOUT_S = 5.0
 HANDS: dict[str, Command] = {"stop": Stop(), "standby": SelectMode(AcuMode.STANDBY), "stow": Stow()}
@@ -323,7 +324,13 @@ class Rig:
             assert self._runs_on, f"the daemon ended: {self.outcomes[-1]}"
 
     def stall(self, time_s: float) -> None:
-        """SIGSTOP and SIGCONT: the loop finds that time has passed."""
+        """SIGSTOP just before a tick, and SIGCONT: the loop finds that time has passed."""
+        period_s = self.config.period_s
+        self.wait(period_s - self.daemon_clock.tai_s() % period_s - STALL_LEAD_S)
+        self.skip(time_s)
+
+    def skip(self, time_s: float) -> None:
+        """Let time pass in which nothing runs."""
         self.judge.stalled(time_s)
         self.loop._now_s += time_s
 

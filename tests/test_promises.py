@@ -18,10 +18,11 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 from promise_judge import SPOILING
 from promise_rig import HANDS, Rig, demo_scene
 
-from acu_daemon.sim.fault_verbs import FRAME_VERBS, VERBS, VerbName
+from acu_daemon.sim.fault_verbs import FRAME_VERBS, PEDESTAL_VERBS, VERBS, VerbName
 
 PROMISES = tuple(f"P{number}" for number in range(1, 11))
-PAUSES_S = st.sampled_from([0.1, 0.3, 0.7, 1.5, 4.0])
+LINE_VERBS = frozenset(VERBS) - FRAME_VERBS - PEDESTAL_VERBS
+PAUSES_S = st.sampled_from([0.1, 0.33, 0.77, 1.5, 4.0])
 GARBLING = ("no-reply", "bad-checksum", "xor-blind", "swapped-digits", "truncated", "garbage-before", "garbage-after")
 LOCK_S = 8.0  # from the start to a fit
 SERVING = ("AUTOTRACK/FITTED", "HOLD/FITTED", "AUTOTRACK/TLE", "HOLD/TLE", "SEARCH")
@@ -45,7 +46,7 @@ class Promises(RuleBasedStateMachine):
         self.rig = Rig(Path(self.directory.name), demo_scene(), is_armed=is_armed, seed=seed)
         self.rig.wait(LOCK_S if is_locked else 0.05)
 
-    @rule(time_s=st.sampled_from([0.1, 0.35, 1.0, 3.0, 10.0]))
+    @rule(time_s=st.sampled_from([0.1, 0.36, 1.02, 3.0, 10.0]))
     def time_passes(self, time_s: float) -> None:
         self.rig.wait(time_s)
 
@@ -72,13 +73,23 @@ class Promises(RuleBasedStateMachine):
         lasts = "" if duration_s is None else f" duration_s={duration_s}"
         self.break_it(verb, f"{verb} count={count} probability={probability} on={on} seed={seed}{lasts}", pause_s)
 
+    @rule(verb=verbs(LINE_VERBS), duration_s=st.sampled_from([0.3, 1.0, 5.0, None]), pause_s=PAUSES_S)
+    def the_line_fails(self, verb: VerbName, duration_s: float | None, pause_s: float) -> None:
+        lasts = "" if duration_s is None else f" duration_s={duration_s}"
+        self.break_it(verb, f"{verb}{lasts}", pause_s)
+
+    @rule(verb=st.sampled_from(["stuck", "reversed", "runaway"]), axis=st.sampled_from(["azimuth", "elevation"]))
+    def an_axis_fails_in_a_loss(self, verb: VerbName, axis: str) -> None:
+        self.rig.fault("silence duration_s=12")
+        self.break_it(verb, f"{verb} axis={axis} start_s=0.5 duration_s=8", 7.0)
+
     @rule(
-        verb=verbs(set(VERBS) - FRAME_VERBS),
+        verb=verbs(PEDESTAL_VERBS),
         duration_s=st.sampled_from([0.3, 1.0, 5.0, None]),
         axis=st.sampled_from(["azimuth", "elevation", "both"]),
         pause_s=PAUSES_S,
     )
-    def line_or_machine_fails(self, verb: VerbName, duration_s: float | None, axis: str, pause_s: float) -> None:
+    def the_machine_fails(self, verb: VerbName, duration_s: float | None, axis: str, pause_s: float) -> None:
         lasts = "" if duration_s is None else f" duration_s={duration_s}"
         self.break_it(verb, f"{verb} axis={axis}{lasts}", pause_s)
 
@@ -117,7 +128,7 @@ class Promises(RuleBasedStateMachine):
         self.rig.fit_trouble = trouble
         self.rig.wait(pause_s)
 
-    @rule(time_s=st.sampled_from([0.03, 0.06, 0.09, 0.3, 2.0]), pause_s=PAUSES_S)
+    @rule(time_s=st.sampled_from([0.06, 0.09, 0.12, 0.17, 2.0]), pause_s=PAUSES_S)
     def the_daemon_stalls(self, time_s: float, pause_s: float) -> None:
         self.rig.stall(time_s)
         self.rig.wait(pause_s)
