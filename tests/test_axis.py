@@ -33,7 +33,7 @@ def test_a_target_of_constant_rate_is_reached_exactly_and_then_held_exactly(star
     targets = _moving(target, rate, 3500)
     states = _run(AxisState(start, own_rate), targets)
     assert states[-1] == AxisState(*targets[-1])
-    first = next(k for k, (s, t) in enumerate(zip(states[1:], targets, strict=True)) if s.position_deg == t[0])
+    first = next(k for k, (s, t) in enumerate(zip(states[1:], targets, strict=True)) if s == AxisState(*t))
     assert all(s == AxisState(*t) for s, t in zip(states[1 + first :], targets[first:], strict=True))
 
 

@@ -4,6 +4,7 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
@@ -12,6 +13,7 @@ from typing import NoReturn
 from tables.console import say
 
 INTERRUPTED = 130
+LAST_RESORT_S = 10.0
 
 
 @contextmanager
@@ -31,8 +33,12 @@ def worker_pool() -> Iterator[ProcessPoolExecutor]:
         yield pool
     except BaseException:
         for process in multiprocessing.active_children():
-            process.terminate()
+            process.kill()
+        last_resort = threading.Timer(LAST_RESORT_S, os._exit, (INTERRUPTED,))  # a killed process may have held a lock
+        last_resort.daemon = True
+        last_resort.start()
         pool.shutdown(cancel_futures=True)
+        last_resort.cancel()
         raise
     pool.shutdown()
 
