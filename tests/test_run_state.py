@@ -17,14 +17,14 @@ from acu_daemon.edge.run_state import RUN_STATE, RunState, RunStateKeeper, read_
 from acu_daemon.edge.writer import Writer
 from acu_daemon.model import Pass
 
-STATE = RunState("ISS (25544)", 1000.0, 1600.0, None, "HOLD/FITTED", False, "azimuth does not move", CARRIED)
+STATE = RunState("ISS (25544)", 1000.0, 1600.0, None, "HOLD/FITTED", False, CARRIED)
 COMING = Pass(1000.2, 1300.0, 1600.1, 10.0, 60.0, 90.0, 170.0)
 
 
 def written(directory: Path, state: RunState = STATE) -> Path:
     writer = Writer("files")
     keeper = RunStateKeeper(directory, writer, replace(state, track=""), lambda _: None)
-    keeper.see(replace(ControlState(), track=TrackState(state.track), arming=state.arming, latch=state.latch))
+    keeper.see(replace(ControlState(), track=TrackState(state.track), arming=state.arming))
     assert writer.close(60.0)
     return directory / RUN_STATE
 
@@ -77,7 +77,6 @@ def test_p10_every_cut_of_a_file_is_an_alarm(tmp_path: Path) -> None:
     [
         ("version", 2),
         ("arming", "yes"),
-        ("latch", None),
         ("satellite", 7),
         ("rise_tai_s", "soon"),
         ("set_tai_s", float("nan")),
@@ -116,18 +115,18 @@ def test_another_rehearsal_of_the_pass_is_not_gone_on_with(clock_s: float | None
 def test_a_change_is_written_and_a_tick_without_one_is_not(tmp_path: Path) -> None:
     writer = Writer("files")
     keeper = RunStateKeeper(tmp_path, writer, STATE, lambda fit: replace(CARRIED, at_tai_s=fit.at_tai_s))
-    state = replace(ControlState(), track=TrackState.HOLD_FITTED, arming=False, latch=STATE.latch)
+    state = replace(ControlState(), track=TrackState.HOLD_FITTED, arming=False)
     for _ in range(10):
         keeper.see(state)
     while writer.waiting_count:
         pass
     assert not (tmp_path / RUN_STATE).exists()
     keeper.offer(replace(FIT, at_tai_s=5.0))
-    keeper.see(replace(state, latch=""))
+    keeper.see(replace(state, arming=True))
     assert writer.close(60.0)
     read = read_run_state(tmp_path)
     assert read.fit is not None
-    assert (read.latch, read.fit.at_tai_s) == ("", 5.0)
+    assert (read.arming, read.fit.at_tai_s) == (True, 5.0)
 
 
 def test_p10_a_full_disk_is_told_at_its_edges(tmp_path: Path) -> None:
@@ -135,17 +134,17 @@ def test_p10_a_full_disk_is_told_at_its_edges(tmp_path: Path) -> None:
     gone = tmp_path / "gone"
     keeper = RunStateKeeper(gone, writer, STATE, lambda _: None)
 
-    def see(latch: str) -> None:
-        keeper.see(replace(ControlState(), latch=latch))
+    def see(track: TrackState) -> None:
+        keeper.see(replace(ControlState(), track=track))
         while keeper._latest._is_waiting or writer.waiting_count:
             pass
 
     with capture_logs() as logs:
-        see("a")
-        see("b")
+        see(TrackState.IDLE)
+        see(TrackState.PREPOSITION)
         writer.put(gone.mkdir)
-        see("c")
-        see("d")
+        see(TrackState.ACQUIRE_TLE)
+        see(TrackState.HOLD_FITTED)
         assert writer.close(60.0)
     assert [log["event"] for log in logs] == ["run_state.not_saved", "run_state.saved_again"]
-    assert read_run_state(gone).latch == "d"
+    assert read_run_state(gone).track == "HOLD/FITTED"

@@ -14,6 +14,7 @@ from acu_daemon.config import estimator_settings
 from acu_daemon.control.state import ControlState
 from acu_daemon.edge.carry_over import FitKeeper, carry_over_path, read_carry_over
 from acu_daemon.edge.clock import SystemClock
+from acu_daemon.edge.latch import LatchKeeper, read_latch
 from acu_daemon.edge.run_state import RunState, RunStateKeeper, read_run_state
 from acu_daemon.edge.writer import Writer
 from acu_daemon.model import FitResult, Pass
@@ -21,7 +22,7 @@ from acu_daemon.model import FitResult, Pass
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """What was left, and the two that keep what this run leaves.
+    """What was left, and the three that keep what this run leaves.
 
     carried: the fit of this pass, where the daemon is started again in it, else what the last pass left.
     arming: as a person left it in this pass; None: as configured.  latch: until a person clears it, whatever the pass.
@@ -32,6 +33,7 @@ class Kept:
     latch: str
     carry_over: FitKeeper
     run_state: RunStateKeeper
+    latches: LatchKeeper
 
     def offer(self, fit: FitResult) -> None:
         """Take an accepted fit."""
@@ -40,6 +42,7 @@ class Kept:
 
     def see(self, state: ControlState) -> None:
         """Take the memory of a tick."""
+        self.latches.see(state)
         self.run_state.see(state)
 
     def flush(self) -> None:
@@ -51,7 +54,7 @@ def open_kept(directory: Path, target: Target, coming: Pass, clock: SystemClock,
     """Read what was left; say in the log what of it is used."""
     source, site, now_tai_s = target.elements.propagator, target.station.site, clock.tai_s()
     clock_s = now_tai_s - clock.monotonic_s() if clock.is_rehearsal else None
-    left = read_run_state(directory)
+    left, latch = read_run_state(directory), read_latch(directory)
     is_same_pass = left.is_of(target.elements.label, coming, clock_s)
     resumed = _resumed(left, target, now_tai_s) if is_same_pass else None
     path = carry_over_path(directory, target.satellite.satellite.norad_id, target.satellite.satellite.name)
@@ -61,15 +64,15 @@ def open_kept(directory: Path, target: Target, coming: Pass, clock: SystemClock,
         set_tai_s=coming.set_tai_s,
         clock_s=clock_s,
         arming=left.arming if is_same_pass else None,
-        latch=left.latch,
         fit=resumed,
     )
     return Kept(
         carried=resumed or _carried(target, path, now_tai_s),
         arming=first.arming,
-        latch=first.latch,
+        latch=latch,
         carry_over=FitKeeper(path, target.elements.label, partial(carry_over_of, source=source, site=site), files),
         run_state=RunStateKeeper(directory, files, first, partial(resume_of, source=source, site=site)),
+        latches=LatchKeeper(directory, files, latch, clock),
     )
 
 

@@ -1,6 +1,6 @@
-"""What a restart needs (run.json in the state directory): the pass in progress, its newest fit, arming, latch.
+"""What a restart needs (run.json in the state directory): the pass in progress, its newest fit, arming.
 
-Written whole, beside the loop, at every accepted fit and whenever state, arming or latch change.
+Written whole, beside the loop, at every accepted fit and whenever state or arming change.  The latch has its own file.
 """
 
 import contextlib
@@ -37,7 +37,6 @@ class RunState:
     clock_s: float | None = None
     track: str = ""
     arming: bool | None = None  # as a person left it; None: as configured
-    latch: str = ""
     fit: CarryOver | None = None
 
     def is_of(self, satellite: str, coming: Pass, clock_s: float | None) -> bool:
@@ -66,7 +65,7 @@ def read_run_state(directory: Path) -> RunState:
             "run_state.unreadable",
             file=str(path),
             reason=reason_of(error),
-            action=f"begun anew, without latch and arming; kept as {bad.name}",
+            action=f"begun anew, without arming; kept as {bad.name}",
         )
         with contextlib.suppress(OSError):
             path.replace(bad)
@@ -93,7 +92,7 @@ class RunStateKeeper:
 
     def see(self, state: ControlState) -> None:
         """Take the memory of a tick; it is written where it differs."""
-        seen = replace(self._state, track=str(state.track), arming=state.arming, latch=state.latch)
+        seen = replace(self._state, track=str(state.track), arming=state.arming)
         if seen != self._state:
             self._state = seen
             self._latest.offer((seen, self._fit))
@@ -124,7 +123,6 @@ def _to_json(state: RunState) -> dict[str, Any]:
         "clock_s": state.clock_s,
         "state": state.track,
         "arming": state.arming,
-        "latch": state.latch,
         "fit": None if state.fit is None else to_json(state.satellite, state.fit),
     }
 
@@ -144,7 +142,6 @@ def _from_json(read: Any) -> RunState:
         clock_s=None if clock_s is None else number(clock_s),
         track=_text(read["state"]),
         arming=arming,
-        latch=_text(read["latch"]),
         fit=None if read["fit"] is None else replace(from_json(read["fit"], satellite), is_of_this_pass=True),
     )
 
