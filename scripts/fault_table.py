@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from fault_flights import CASES, Measured, measure
 
 NOT_SHOWN = {"IDLE", "PREPOSITION"}  # on the way back
-SAID = ("acu.doubted", "acu.nak", "acu.faults", "axis.latched", "encoder.frozen", "clock.stepped")
+SAID = ("acu.doubted", "acu.nak", "acu.faults", "disarmed", "axis.latched", "encoder.frozen", "clock.stepped")
 SAID += ("link.poor", "link.lost")
 HEADER = ("fault", "shows", "log", "beam off (deg)", "back after (s)", "then (deg)", "outside / burst / stale")
 

@@ -15,6 +15,7 @@ T = RISING_TAI_S
 LOST_S, FAULT_S, BACK_S = 11.0, 14.0, 23.0  # the signal goes, the fault begins, the signal comes back
 ON_PATH_DEG = 0.1
 BURST_S = 0.030  # two register writes nearer than this are a burst; a late tick may halve the period, no more
+ROUNDING_S = 1e-6  # of differences of TAI
 STALE_S = 0.1  # a register write that was applied so long after it was sent
 
 
@@ -30,6 +31,7 @@ class Case:
     from_s: float = FAULT_S
     recovers_s: float = 2.5  # to be on the path again, at the latest: a second of back-off is in it
     clear_s: float | None = None  # a person clears the latch then, the fault mended
+    arm_s: float | None = None  # a person arms then
     back_s: float = BACK_S
 
 
@@ -49,6 +51,7 @@ class Measured:
 
 
 WIRE_S = FAULT_S + 3.0
+ARM_S = WIRE_S + 1.0
 
 
 def wire(verb: str, keys: str = "", shows: tuple[str, ...] = (), *, says: str = "", recovers_s: float = 0.5) -> Case:
@@ -128,7 +131,13 @@ CASES: dict[str, Case] = {
         ("power-cycle start_s=8 duration_s=1",), 9.0, ("LINK-LOST",), ((14.0, BACK_S),), from_s=8.0, recovers_s=3.0
     ),
     "local-panel": wire("local-panel", "", ("MANUAL", "HOLD/FITTED")),
-    "emergency-stop": wire("emergency-stop", "", ("FAULT", "HOLD/FITTED"), says="acu.faults"),
+    "emergency-stop": Case(
+        (f"emergency-stop start_s={FAULT_S} duration_s=3",),
+        ARM_S,
+        ("FAULT", "HOLD/FITTED"),
+        says="disarmed",
+        arm_s=ARM_S,
+    ),
     "limit-switch": wire("limit-switch", "axis=elevation"),
     "stuck": wire("stuck", "axis=elevation"),
     "stuck for good": latch("stuck", 23.0, "axis=elevation"),
@@ -156,9 +165,11 @@ def flown(name: str) -> Flight:
     """The flight of a case; flown once."""
     case = CASES[name]
     clock = SteppedClock if name == "clock-step" else LoopClock
-    script: Script = ()
-    if case.clear_s is not None:
-        script = [(case.clear_s, lambda stage: (stage.service.answer("clear"), None)[1])]
+    script: Script = [
+        (at_s, lambda stage, word=word: (stage.service.answer(word), None)[1])
+        for at_s, word in ((case.clear_s, "clear"), (case.arm_s, "arm"))
+        if at_s is not None
+    ]
     return climb(case.back_s + 4.0, losses=case.losses, faults=case.faults, make_clock=clock, script=script)
 
 
@@ -185,7 +196,7 @@ def measure(name: str) -> Measured:
         after_deg=max(error_deg for time_s, error_deg in errors if time_s > recovered_at_s),
         end_state=flight.snapshots[-1].state,
         outside_count=outside_count(flight),
-        burst_count=sum(1 for gap_s in write_gaps_s(flight) if gap_s < BURST_S),
+        burst_count=sum(1 for gap_s in write_gaps_s(flight) if gap_s < BURST_S - ROUNDING_S),
         stale_count=stale_count(flight),
     )
 

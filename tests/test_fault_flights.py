@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
-from fault_flights import CASES, FAULT_S, ON_PATH_DEG, T, flown, measure
+from fault_flights import ARM_S, CASES, FAULT_S, ON_PATH_DEG, WIRE_S, T, flown, measure
 from flights import commands_between, events_named, rows_between, seconds_to_state
 
 from acu_daemon.protocol.messages import Poll, ReadFaults, ReadParameter, Stop, WriteParameter
@@ -51,6 +51,18 @@ def test_p6_a_latched_axis_is_stopped_and_told_nothing_until_a_person_clears_it(
     ]
     assert max(standing) - min(standing) < 0.01
     assert any(seen.latch for seen in flight.snapshots if T + latched_s < seen.tai_s < T + cleared_s)
+
+
+def test_p1_after_an_emergency_stop_nothing_moves_until_a_person_arms() -> None:
+    """P1."""
+    flight = flown("emergency-stop")
+    assert [event["by"] for event in events_named(flight, "disarmed")] == ["the emergency stop"]
+    told = [type(command) for command in commands_between(flight, T + FAULT_S + 0.5, T + ARM_S)]
+    assert set(told) == {Poll}
+    still = [row.encoder_az_deg + row.encoder_el_deg for row in rows_between(flight, T + FAULT_S + 1.0, T + ARM_S)]
+    assert max(still) - min(still) < 0.01
+    released = [seen for seen in flight.snapshots if T + WIRE_S + 0.2 < seen.tai_s < T + ARM_S]
+    assert {(seen.state, seen.disarmed_by) for seen in released} == {("IDLE", "the emergency stop")}
 
 
 @pytest.mark.parametrize("name", sorted(CASES.keys() - set(LATCHES)))

@@ -17,11 +17,13 @@ from acu_daemon.protocol.messages import (
     Backup,
     ClearChange,
     Command,
+    Faults,
     Identify,
     Identity,
     Nak,
     Parameter,
     Poll,
+    ReadFaults,
     ReadParameter,
     ResetFault,
     SelectBackup,
@@ -50,7 +52,7 @@ def run(
 ) -> tuple[ControlState, list[Command]]:
     """Ticks against an ACU that acknowledges STOP; returns all that was sent."""
     sent: list[Command] = []
-    extra = None
+    extra = first.pop("extra", None)
     for k in range(count):
         observed = saw(seen, extra=extra, **(first if k == 0 else {}))
         observed = replace(observed, reading=replace(observed.reading, tai_s=NOW + 0.1 * k))
@@ -203,6 +205,52 @@ def test_an_acu_found_autotracking_far_from_the_path_is_not_believed() -> None:
     assert tick(ready(TrackState.IDLE, status()), saw(status()), FITTED, NOW, CONFIG)[0].track is (
         TrackState.AUTOTRACK_FITTED
     )
+
+
+# The interlock
+
+PRESSED = status(AcuMode.FAULT, is_autotrack_selected=False, has_interlock_fault=True)
+
+
+def after_fault(faults: Faults) -> tuple[ControlState, list[Command]]:
+    """A fault in mid-pass, its detail read, and reset by hand; what was sent since the detail was known."""
+    state, sent = run(moving(), PRESSED)
+    assert ReadFaults() in sent
+    state, sent = run(state, PRESSED, 10, extra=Exchange(ReadFaults(), faults))
+    assert ReadFaults() not in sent
+    state, more = run(state, status(AcuMode.STANDBY), 20)
+    return state, sent + more
+
+
+@pytest.mark.parametrize(
+    ("faults", "by"),
+    [
+        (Faults(interlock=1), "the emergency stop"),
+        (Faults(interlock=2), "an open door"),
+        (Faults(interlock=3, azimuth=1), "the emergency stop"),
+    ],
+)
+def test_p1_an_emergency_stop_or_an_open_door_disarms_until_a_person_arms(faults: Faults, by: str) -> None:
+    state, sent = after_fault(faults)
+    assert orders_of(sent) == [WriteParameter("W", 0)]
+    assert (state.is_armed(GUARDED), state.disarmed_by) == (False, by)
+    assert state.track is TrackState.IDLE
+    state, _ = run(state, status(AcuMode.STANDBY), 2, requests=(Request.ARM,))
+    assert (state.is_armed(GUARDED), state.disarmed_by) == (True, "")
+
+
+@pytest.mark.parametrize("faults", [Faults(azimuth=1), Faults(interlock=4), Faults(interlock=8), Faults(system=2)])
+def test_after_any_other_fault_the_daemon_goes_on_by_itself(faults: Faults) -> None:
+    state, sent = after_fault(faults)
+    assert state.is_armed(GUARDED)
+    assert any(isinstance(command, WriteAndPoll) for command in sent)
+
+
+def test_a_person_who_arms_while_the_button_is_still_pressed_is_obeyed_when_it_is_released() -> None:
+    state, _ = run(moving(), PRESSED)
+    state, _ = run(state, PRESSED, 5, extra=Exchange(ReadFaults(), Faults(interlock=1)))
+    state, _ = run(state, PRESSED, 5, requests=(Request.ARM,))
+    assert state.is_armed(GUARDED)
 
 
 # The fence

@@ -27,6 +27,7 @@ from acu_daemon.protocol.messages import (
     AcuMode,
     Backup,
     Command,
+    Faults,
     Identify,
     Nak,
     Poll,
@@ -212,8 +213,21 @@ def test_a_fault_ends_every_active_state_and_asks_once_what_it_is(track: TrackSt
     state, orders = step(track, seen)
     assert state.track is TrackState.FAULT
     assert orders.extra == ReadFaults()
-    _, later = tick(state, saw(seen), SKY, NOW + 5.0, CONFIG)
+    answered = saw(seen, extra=Exchange(ReadFaults(), Faults(azimuth=1)))
+    state, later = tick(state, answered, SKY, NOW, CONFIG)
     assert later.extra is None
+    assert tick(state, saw(seen), SKY, NOW + 0.4, CONFIG)[1].extra is None
+
+
+def test_a_fault_detail_is_asked_for_until_it_is_answered_and_again_when_the_bits_change() -> None:
+    seen = status(AcuMode.FAULT, is_autotrack_selected=False, has_azimuth_fault=True)
+    state, _ = step(TrackState.AUTOTRACK_FITTED, seen)
+    state, orders = tick(state, saw(seen, extra=Exchange(ReadFaults(), None)), SKY, NOW + EXTRA_REPEAT_S, CONFIG)
+    assert orders.extra == ReadFaults()
+    state = replace(state, extra_after_tai_s=NOW)
+    state, orders = tick(state, saw(seen, extra=Exchange(ReadFaults(), Faults(azimuth=1))), SKY, NOW, CONFIG)
+    assert orders.extra is None
+    assert tick(state, saw(replace(seen, has_interlock_fault=True)), SKY, NOW, CONFIG)[1].extra == ReadFaults()
 
 
 @pytest.mark.parametrize("track", sorted(ACTIVE))

@@ -1,7 +1,7 @@
-"""Hands on the antenna beside the daemon's: arming, disarming, STOP from elsewhere, the latch of an axis.  Pure.
+"""Hands on the antenna beside the daemon's: arming, disarming, STOP from elsewhere, the interlock, the latch.  Pure.
 
-Disarmed, nothing is written; in mid-pass a STOP goes before that.  A STOP by another hand disarms too.  The latch stays
-until a person clears it, whatever the link and the ACU do meanwhile.
+Disarmed, nothing is written; in mid-pass a STOP goes before that.  A STOP by another hand disarms too, and so do
+the emergency stop and an open door.  The latch stays until a person clears it, whatever the link and the ACU do.
 """
 
 from collections.abc import Iterable
@@ -10,14 +10,15 @@ from dataclasses import replace
 from acu_daemon.control.axis_watch import AxesWatch, AxisSeen, duty_of, sky_scale, watch_axes
 from acu_daemon.control.start import WATCHDOG
 from acu_daemon.control.state import ControlConfig, ControlState, Event, Observation, Request, Stage, Watchdog
-from acu_daemon.control.states import ACTIVE
-from acu_daemon.protocol.messages import AcuMode, Backup, Command, Status, Stop, WriteParameter
+from acu_daemon.control.states import ACTIVE, TrackState
+from acu_daemon.protocol.messages import AcuMode, Backup, Command, Faults, ReadFaults, Status, Stop, WriteParameter
 from acu_daemon.units import wrap_180
 
 NO_STOP_MODES = (AcuMode.MANUAL, AcuMode.STOWING, AcuMode.STOWED, AcuMode.FAULT)  # a stop would disturb, or do nothing
 STOPPED_FROM = (AcuMode.REMOTE, AcuMode.ACQUIRE, AcuMode.AUTOTRACK, AcuMode.REMOTE_BACKUP)
 UNSERVED_S = 0.5  # registers unwritten for so long: STANDBY may be the work of the ACU's own watchdog
 RATE_SPAN_S = 1.0
+EMERGENCY_STOP, DOOR_OPEN = 1, 2  # of the interlock nibble, ICD section 4
 
 
 def obey(state: ControlState, requests: Iterable[Request], config: ControlConfig, events: list[Event]) -> ControlState:
@@ -71,6 +72,26 @@ def respect_stop(before: ControlState, state: ControlState, config: ControlConfi
     if is_ours and is_stopped and is_served and _faults(now) == _faults(was):
         return _disarm(state, "another hand that stopped the antenna", events)
     return state
+
+
+def respect_interlock(
+    state: ControlState, seen: Observation, config: ControlConfig, events: list[Event]
+) -> ControlState:
+    """Disarm for the emergency stop or an open door: a person is there, and only a person can say that it is over."""
+    faults = seen.extra.reply if seen.extra is not None else None
+    if not isinstance(faults, Faults) or state.status is None:
+        return state if state.track is TrackState.FAULT else replace(state, faults_read=None)
+    state = replace(state, faults_read=_faults(state.status))
+    if not faults.interlock & (EMERGENCY_STOP | DOOR_OPEN) or not state.is_armed(config):
+        return state
+    return _disarm(state, "the emergency stop" if faults.interlock & EMERGENCY_STOP else "an open door", events)
+
+
+def question(state: ControlState) -> Command | None:
+    """Ask what a fault is, until it is answered, and again when its bits change."""
+    if state.track is not TrackState.FAULT or state.stage is Stage.NEW or state.status is None:
+        return None
+    return ReadFaults() if state.faults_read != _faults(state.status) else None
 
 
 def _faults(status: Status) -> tuple[bool, ...]:

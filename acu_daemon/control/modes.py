@@ -2,7 +2,7 @@
 
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.states import AUTOTRACKING, HOLDING, TrackState
-from acu_daemon.protocol.messages import AcuMode, Backup, Command, ReadFaults, SelectBackup, SelectMode
+from acu_daemon.protocol.messages import AcuMode, Backup, Command, SelectBackup, SelectMode
 
 STANDBY = SelectMode(AcuMode.STANDBY)  # the one mode command that the ACU takes in STOWED, ICD section 5
 UNDER_AUTOTRACK = AUTOTRACKING | HOLDING | {TrackState.ACQUIRE_TLE, TrackState.SEARCH}
@@ -17,8 +17,6 @@ def wanted_mode_command(state: ControlState, *, is_settled: bool) -> Command | N
     status = state.status
     if status is None:
         return None
-    if state.track is TrackState.FAULT and state.last_extra != ReadFaults():
-        return ReadFaults()
     if state.track is not TrackState.PREPOSITION and state.track not in UNDER_AUTOTRACK:
         return None
     is_stuck = status.mode is AcuMode.STANDBY and status.is_autotrack_selected  # selected again, it would not change

@@ -113,6 +113,7 @@ class ControlState:
     arming: bool | None = None  # as people or another hand at the ACU left it; None: as configured
     disarmed_by: str = ""
     latch: str = ""  # what an axis did wrong; nothing moves until a person clears it
+    faults_read: tuple[bool, ...] | None = None  # the fault bits of the status whose detail was read, while in FAULT
     is_stop_due: bool = False  # STOP is sent until it is acknowledged
     in_force: tuple[float, float, float] | None = None  # the last accepted write: time, continuous azimuth, elevation
     watchdog: Watchdog = Watchdog.UNKNOWN

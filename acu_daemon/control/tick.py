@@ -11,7 +11,15 @@ from acu_daemon.control.axis_watch import AxesWatch
 from acu_daemon.control.causes import LINK_SILENCE_S, find_causes, path_point
 from acu_daemon.control.fence import fence
 from acu_daemon.control.gate import Passed, gate
-from acu_daemon.control.hands import last_command, let_be, obey, respect_stop, watch_antenna
+from acu_daemon.control.hands import (
+    last_command,
+    let_be,
+    obey,
+    question,
+    respect_interlock,
+    respect_stop,
+    watch_antenna,
+)
 from acu_daemon.control.modes import wanted_mode_command
 from acu_daemon.control.search import search_offset, search_pointing
 from acu_daemon.control.start import next_command
@@ -46,6 +54,7 @@ def tick(
     state = absorb(state, seen, sky, now_tai_s, config, events)
     state = obey(state, seen.requests, config, events)
     state = respect_stop(before, state, config, events)
+    state = respect_interlock(state, seen, config, events)
     state = let_be(watch_antenna(state, seen, config, events))
     state = _walk(state, seen, sky, now_tai_s, config, events)
     is_write_owed = before.stage is Stage.READY and bool(before.commands) and before.commands[-1] is None
@@ -137,8 +146,8 @@ def _extra(state: ControlState, now_tai_s: float, config: ControlConfig) -> Comm
     wanted = last_command(state, config)
     if wanted is None and now_tai_s - state.reading.tai_s > LINK_SILENCE_S:
         return None  # a status from before an outage: who knows where the antenna is now
-    wanted = wanted or next_command(state, config)
-    if wanted is None and (state.track is TrackState.FAULT or _are_registers_fresh(state, now_tai_s)):
+    wanted = wanted or question(state) or next_command(state, config)
+    if wanted is None and _are_registers_fresh(state, now_tai_s):
         wanted = wanted_mode_command(state, is_settled=now_tai_s - state.extra_after_tai_s > EXTRA_SETTLED_S)
     if wanted is None or (wanted == state.last_extra and now_tai_s < state.extra_after_tai_s):
         return None
