@@ -40,6 +40,8 @@ main()
 def rig(tmp_path: Path) -> Iterator[Any]:
     scene = pass_rig.make_scene(tmp_path / "scene", None, 120.0)
     with pass_rig.rigs(scene, ["tcp"], tmp_path) as made:
+        scenario = made[0].config / "scenario.toml"  # elements so good that the signal is acquired wherever it begins
+        scenario.write_text(scenario.read_text().replace("along_track_s = 0.9", "along_track_s = 0.3"))
         made[0].start_acu()
         yield made[0]
 
@@ -100,6 +102,11 @@ def test_the_unit_restarts_for_ever_but_not_after_a_refused_configuration() -> N
 def test_a_crash_between_two_runs_is_no_reason_to_stop_the_antenna(tmp_path: Path) -> None:
     assert "started again" in why_not({"SERVICE_RESULT": "signal", "RUNTIME_DIRECTORY": str(tmp_path)})
     assert "by itself" in why_not({"SERVICE_RESULT": "success", "RUNTIME_DIRECTORY": str(tmp_path)})
+
+
+def test_p4_a_daemon_that_is_not_started_again_leaves_its_antenna_stopped(tmp_path: Path) -> None:
+    assert why_not({"SERVICE_RESULT": "exit-code", "EXIT_STATUS": "2", "RUNTIME_DIRECTORY": str(tmp_path)}) == ""
+    assert why_not({"SERVICE_RESULT": "exit-code", "EXIT_STATUS": "4", "RUNTIME_DIRECTORY": str(tmp_path)}) != ""
 
 
 def test_a_final_stop_that_the_daemon_did_not_survive_is_one(tmp_path: Path) -> None:

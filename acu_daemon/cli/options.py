@@ -88,8 +88,8 @@ class Target:
 
 def load_target(config: Path, name: str, now_tai_s: float, *, is_strict: bool = True) -> Target:
     """Read both files and the elements.  With is_strict, elements that must not be used raise ElementsError."""
-    for directory in (config, config / "satellites"):
-        refuse_world_writable(directory)
+    for path in (config, config / "satellites", config / "station.toml", config / "satellites" / f"{name}.toml"):
+        refuse_world_writable(path)
     base = load_station(config)
     satellite, station = load_satellite(config, name, base)
     elements = load_elements(satellite, config / "satellites" / f"{name}.toml", now_tai_s, station.site.orientation)

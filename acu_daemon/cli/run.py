@@ -96,7 +96,8 @@ def command(
     Polls the ACU, writes its registers ten times a second, fits the orbit while the signal is locked and steers by the
     prediction while it is not.  Ends after the pass, after --duration, on SIGTERM or Ctrl-C, with a safe stop.
 
-    Exit status: 0 done; 1 the satellite was never acquired; 2 wrong use or configuration; 3 no ACU within 10 s.
+    Exit status: 0 done; 1 the satellite was never acquired, or the antenna could not be stopped; 2 wrong use or
+    configuration; 3 no ACU within 10 s.
     """
     os.umask(0o027)  # what is left belongs to this user and its group
     if not faulthandler.is_enabled():
@@ -132,6 +133,8 @@ def command(
         job = replace(job, arming=kept.arming, latch=kept.latch)
         outcome = asyncio.run(_run(job, link, clock, live, recording, files, kept, directory))
         structlog.get_logger("run").info("run.done", **asdict(outcome))
+    if not outcome.is_stopped:
+        raise typer.Exit(1)
     if (
         outcome.has_begun
         and not outcome.has_acquired

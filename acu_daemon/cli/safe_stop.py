@@ -21,6 +21,7 @@ from acu_daemon.protocol.messages import Poll, Status
 from acu_daemon.protocol.sa3842 import address_byte
 
 DEADLINE_S = 5.0
+NOT_RESTARTED = "2"  # RestartPreventExitStatus= of the unit: a refused configuration
 FINAL = "final"  # the file in $RUNTIME_DIRECTORY that says: this stop was asked for, nothing starts again after it
 
 
@@ -51,7 +52,9 @@ def command(
 
 def why_not(environment: Mapping[str, str]) -> str:
     """Why an ended service needs no safe stop; empty: it does (systemd.exec(5), $SERVICE_RESULT)."""
-    result = environment.get("SERVICE_RESULT", "")
+    result, status = environment.get("SERVICE_RESULT", ""), environment.get("EXIT_STATUS", "")
+    if result == "exit-code" and status == NOT_RESTARTED:
+        return ""
     if result == "success":
         return "the daemon ended by itself and stopped the antenna"
     if not (Path(environment.get("RUNTIME_DIRECTORY", "/nonexistent")) / FINAL).exists():

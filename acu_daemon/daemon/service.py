@@ -25,7 +25,7 @@ from acu_daemon.errors import NoAcuError, UsageError
 from acu_daemon.model import FitResult, Pass, Prediction, Reading, sky_angle_deg
 
 FIRST_POLL_S = 10.0  # no good poll within this of the start ends the run
-STOP_DEADLINE_S = 1.0
+STOP_DEADLINE_S = 5.0  # a link that is down may come back; the service's TimeoutStopSec is longer
 LATENESS_TICKS = 100  # of the snapshot: the newest ten seconds
 
 
@@ -284,8 +284,8 @@ class Service:
 
     def _request(self, request: Request) -> str:
         state = self._area.state
-        if request is Request.ARM and self._job.control.is_shadow:
-            return "error this daemon runs with --shadow: it commands nothing; start one without"
+        if self._job.control.is_shadow:
+            return f"error this daemon runs with --shadow: it commands nothing, so there is nothing to {request}"
         if request is Request.CLEAR and not state.latch:
             return "ok nothing is latched"
         self._foreground.ask(request)

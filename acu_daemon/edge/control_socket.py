@@ -76,7 +76,7 @@ def ask(directory: Path, line: str) -> str:
             client.sendall(f"{line}\n".encode())
             reply = _read(client)
     except PermissionError:
-        raise AcuDaemonError(f"{path}: not permitted; be the daemon's user or in the group of that file") from None
+        raise AcuDaemonError(f"{path}: not permitted; be root (sudo), its user or in its group") from None
     except (FileNotFoundError, NotADirectoryError, ConnectionRefusedError):
         raise AcuDaemonError(
             f"{path}: no daemon runs with this state directory; name the --state it was started with "
