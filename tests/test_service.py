@@ -62,6 +62,7 @@ def wait_until(is_so: Callable[[], bool]) -> None:
 
 def last_mode(rig: Any) -> str:
     """How the antenna was left."""
+    time.sleep(0.5)  # the trace has ten lines a second
     rig.stop()
     return read_trace(rig.trace).mode[-1]
 
