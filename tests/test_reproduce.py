@@ -156,8 +156,11 @@ def test_what_the_command_cannot_do_is_told_before_it_computes(
 
 
 INTERRUPTIBLE = """
+import signal
 import time
 from tables.workers import run_script, worker_pool
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's background jobs ignore
 
 def main():
     with worker_pool() as pool:
