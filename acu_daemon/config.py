@@ -209,7 +209,7 @@ class ElementsFileSection(Section):
 class BrouwerSection(Section):
     kind: Literal["brouwer"]
     epoch_utc: UtcTime
-    semi_major_axis_km: Positive
+    semi_major_axis_km: float = Field(ge=1_000, le=1_000_000)
     eccentricity: float = Field(ge=0, lt=1)
     inclination_deg: float = Field(ge=0, le=180)
     raan_deg: float = Field(ge=-360, le=360)

@@ -168,6 +168,7 @@ SATELLITE_MISTAKES = [
     (EPOCH, "epoch_utc = 1989-02-30T00:00:00Z", "not TOML: Invalid date or datetime (at line 6, column 13)"),
     ("eccentricity = 0.0436", "eccentricity = 1.0", "elements.eccentricity = 1.0: expected less than 1"),
     ("7180.0", "nan", "elements.semi_major_axis_km = nan: expected a finite number"),
+    ("7180.0", "7e120", "elements.semi_major_axis_km = 7e+120: expected at most 1e+06"),
     ('kind = "brouwer"', 'kind = "sgp4"', 'elements.kind = "sgp4": expected one of tle, omm, oem, brouwer'),
     ('kind = "brouwer"', "kind = 4", 'elements.kind = "4": expected one of tle, omm, oem, brouwer'),
     ('kind = "brouwer"', 'kind = "tle"', "elements.file is missing; it has no default"),
