@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from flights import LSB_DEG
 
-from acu_daemon.daemon.area import Snapshot
 from acu_daemon.daemon.service import Outcome
+from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.edge.carry_over import read_carry_over
 from acu_daemon.edge.run_state import read_run_state
 from acu_daemon.model import sky_angle_deg

@@ -25,8 +25,8 @@ from acu_daemon.cli.kept import open_kept
 from acu_daemon.cli.options import Target, coming_pass
 from acu_daemon.cli.run import make_job
 from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup
-from acu_daemon.daemon.area import Snapshot
 from acu_daemon.daemon.service import Outcome, Service
+from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.edge.clock import LoopClock, SystemClock
 from acu_daemon.edge.fit import FitDiedError, InlineFitRunner
 from acu_daemon.edge.writer import replace_file

@@ -3,8 +3,8 @@
 import io
 from dataclasses import replace
 
-from acu_daemon.daemon.area import Snapshot
 from acu_daemon.daemon.live import LiveLine, live_text
+from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.orbit.timescales import tai_from_utc
 
 SEEN = Snapshot(

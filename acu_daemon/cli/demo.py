@@ -18,9 +18,9 @@ import typer
 
 from acu_daemon.cli.options import STOP_SIGNALS, Target, coming_pass, load_target
 from acu_daemon.cli.run import make_job
-from acu_daemon.daemon.area import Snapshot
 from acu_daemon.daemon.live import LiveLine
 from acu_daemon.daemon.service import Outcome, Service
+from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.fit import ProcessFitRunner
 from acu_daemon.edge.link import make_link

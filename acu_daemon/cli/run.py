@@ -33,10 +33,10 @@ from acu_daemon.cli.options import (
 )
 from acu_daemon.config import control_config, estimator_settings
 from acu_daemon.control.refit import RefitSetup
-from acu_daemon.daemon.area import Snapshot
 from acu_daemon.daemon.health import Health
 from acu_daemon.daemon.live import LiveLine
 from acu_daemon.daemon.service import Outcome, PassJob, Service
+from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.control_socket import ControlSocket
 from acu_daemon.edge.fit import ProcessFitRunner

@@ -14,8 +14,8 @@ import structlog
 from acu_daemon.cli.options import Target, coming_pass
 from acu_daemon.cli.run import make_job
 from acu_daemon.control.refit import RefitSetup
-from acu_daemon.daemon.area import Snapshot
 from acu_daemon.daemon.service import Outcome, Service
+from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.edge.clock import LoopClock
 from acu_daemon.edge.fit import FitRunner, InlineFitRunner
 from acu_daemon.protocol.messages import Command

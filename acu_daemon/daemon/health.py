@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from acu_daemon.daemon.area import Snapshot
+from acu_daemon.daemon.snapshot import Snapshot
 
 FEED_S = 0.5  # between two signs of life; systemd's limit is WatchdogSec
 STATUS_S = 1.0

@@ -4,7 +4,7 @@ import shutil
 import sys
 from typing import Protocol
 
-from acu_daemon.daemon.area import Snapshot
+from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.orbit.timescales import utc_text
 
 EVERY_TICKS = 2

@@ -1,10 +1,9 @@
 """One pass from start to safe stop: the tasks, their order, and when it ends."""
 
 import asyncio
-import json
 import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import structlog
@@ -12,21 +11,21 @@ import structlog
 from acu_daemon.control.causes import pass_end_tai_s
 from acu_daemon.control.plan import plan_pass
 from acu_daemon.control.refit import RefitSetup
-from acu_daemon.control.state import ControlConfig, ControlState, Request
-from acu_daemon.control.states import AUTOTRACKING
-from acu_daemon.daemon.area import CommonArea, Snapshot
+from acu_daemon.control.state import ControlConfig, ControlState
+from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.background import Background
 from acu_daemon.daemon.foreground import Foreground
+from acu_daemon.daemon.hands import Hands
 from acu_daemon.daemon.port import AcuPort
+from acu_daemon.daemon.snapshot import Snapshot, take_snapshot
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.fit import FitRunner
 from acu_daemon.edge.link import Link
 from acu_daemon.errors import NoAcuError, UsageError
-from acu_daemon.model import FitResult, Pass, Prediction, Reading, sky_angle_deg
+from acu_daemon.model import FitResult, Pass, Reading
 
 FIRST_POLL_S = 10.0  # no good poll within this of the start ends the run
 STOP_DEADLINE_S = 5.0  # a link that is down may come back; the service's TimeoutStopSec is longer
-LATENESS_TICKS = 100  # of the snapshot: the newest ten seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +112,7 @@ class Service:
         self._foreground = Foreground(
             self._area, self._port, clock, job.control, after_tick=self._after_tick, on_reading=on_reading
         )
+        self._hands = Hands(self._area, job.control, self._foreground.ask, self.snapshot)
 
     def stop(self, reason: str) -> None:
         """End the run at the next tick, safe stop included."""
@@ -215,87 +215,18 @@ class Service:
 
     def snapshot(self) -> Snapshot:
         """Everything people look at, now."""
-        state, sky, now_tai_s = self._area.state, self._area.sky, self._clock.tai_s()
-        status, reading, prediction = state.status, state.reading, sky.prediction
-        miss_deg = None
-        if reading is not None and reading.is_locked and prediction is not None:
-            point = prediction.at(reading.tai_s)
-            if point is not None:
-                miss_deg = sky_angle_deg(reading.az_deg, reading.el_deg, point.az_deg, point.el_deg)
-        lag_az_s, lag_el_s = state.lag_s(self._job.control)
-        identity, lateness = self._foreground.identity, self._foreground.lateness.figures(LATENESS_TICKS)
-        return Snapshot(
-            tai_s=now_tai_s,
-            state=str(state.track),
-            az_deg=status.az_deg if status else None,
-            el_deg=status.el_deg if status else None,
-            reading_age_s=now_tai_s - reading.tai_s if reading else None,
-            command_az_deg=state.axis_az.position_deg if state.axis_az else None,
-            command_el_deg=state.axis_el.position_deg if state.axis_el else None,
-            agc_db=status.agc_db if status else None,
-            is_acquired=reading is not None and reading.is_locked,
-            miss_deg=miss_deg,
-            along_s=sky.fit.along_s if sky.fit else None,
-            across_deg=sky.fit.across_deg if sky.fit else None,
-            fit_age_s=now_tai_s - sky.fit.at_tai_s if sky.fit else None,
-            sigma_deg=_sigma_deg(prediction, now_tai_s),
-            inside_s=prediction.seconds_inside(now_tai_s, self._job.control.beamwidth_deg / 2) if prediction else None,
-            buffer_s=max(0.0, prediction.end_tai_s - now_tai_s) if prediction else 0.0,
-            buffer_kind=prediction.kind if prediction else "",
-            lag_az_s=lag_az_s,
-            lag_el_s=lag_el_s,
-            tick_count=self._foreground.tick_count,
-            skipped_tick_count=self._foreground.skipped_tick_count,
-            lateness_p50_ms=lateness.p50_ms,
-            lateness_p99_ms=lateness.p99_ms,
-            lateness_max_ms=lateness.max_ms,
-            write_count=self._foreground.write_count,
-            answered_count=self._foreground.answered_count,
-            attempt_count=self._port.attempt_count,
-            refusal_count=state.gate_refusal_count,
-            clamped_count=state.gate_clamped_count,
-            arming=self._arming(),
-            disarmed_by=state.disarmed_by,
-            latch=state.latch,
-            clock_alarm=self._foreground.clock_watch.alarm,
-            line_alarm=self._foreground.line_watch.alarm,
-            encoder_problem=state.encoders.problem,
-            is_link_up=self._port.is_up,
-            link_problem=self._port.problem,
+        return take_snapshot(
+            self._area,
+            self._foreground,
+            self._port,
+            self._job.control,
+            self._clock.tai_s(),
             is_rehearsal=self._job.is_rehearsal,
-            is_simulation=identity is not None and identity.is_simulated,
-            model=str(self._area.model),
-            rejecting=self._area.gate.rejecting if state.track in AUTOTRACKING else "",
-            rejected_counts=self._area.rejected_counts,
         )
 
-    def _arming(self) -> str:
-        if self._job.control.is_shadow:
-            return "shadow"
-        return "armed" if self._area.state.is_armed(self._job.control) else "disarmed"
-
     def answer(self, line: str) -> str:
-        """Answer a line of the control socket: `ok ...` or `error ...`; the next tick does what it asks."""
-        if line == "status":
-            return f"ok {json.dumps(asdict(self.snapshot()))}"
-        if line not in set(Request):
-            return f"error {line!r} is unknown, expected status, {', '.join(Request)}"
-        return self._request(Request(line))
-
-    def _request(self, request: Request) -> str:
-        state = self._area.state
-        if self._job.control.is_shadow:
-            return f"error this daemon runs with --shadow: it commands nothing, so there is nothing to {request}"
-        if request is Request.CLEAR and not state.latch:
-            return "ok nothing is latched"
-        self._foreground.ask(request)
-        if request is Request.ARM and state.latch:
-            return f"ok armed, but latched: {state.latch}; look at the antenna, then `acu-daemon clear`"
-        return {
-            Request.ARM: "ok armed",
-            Request.DISARM: "ok disarmed: STOP is sent if the daemon moves the antenna, then nothing",
-            Request.CLEAR: f"ok cleared: {state.latch}",
-        }[request]
+        """Answer a line of the control socket."""
+        return self._hands.answer(line)
 
     def _outcome(self, reason: str, is_stopped: bool) -> Outcome:
         state, foreground = self._area.state, self._foreground
@@ -327,10 +258,3 @@ def _innermost(error: Exception) -> Exception:
     while isinstance(error, ExceptionGroup) and len(error.exceptions) == 1:
         error = error.exceptions[0]
     return error
-
-
-def _sigma_deg(prediction: Prediction | None, tai_s: float) -> float | None:
-    if prediction is None or prediction.sigma_deg is None:
-        return None
-    i = round((tai_s - prediction.start_tai_s) / prediction.step_s)
-    return float(prediction.sigma_deg[min(max(i, 0), prediction.sigma_deg.size - 1)])
