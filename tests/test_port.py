@@ -16,7 +16,7 @@ from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.memory import MemoryLink
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.scenario import AcuChoice, Scenario
-from acu_daemon.sim.virtual import run_virtual
+from acu_daemon.sim.virtual import VirtualTimeLoop, run_virtual
 
 BAUD_9600_S = 10 / 9600
 WIRE_S = 45 * BAUD_9600_S  # a WRITE AND STATUS there and back
@@ -83,6 +83,25 @@ def test_a_late_reply_is_not_taken_for_the_next_one() -> None:
         assert port.discarded_count >= 1
 
     play(story, latency_s=0.120, is_kept=False)
+
+
+def test_p8_a_reply_that_came_in_time_counts_though_the_loop_looked_after_the_deadline() -> None:
+    async def story(port: AcuPort, _link: MemoryLink, clock: LoopClock) -> None:
+        began_s = clock.monotonic_s()
+        asyncio.get_running_loop().call_later(0.005, stand_still, 0.200)
+        answer = await port.exchange(Poll())  # answered after 10 ms
+        assert isinstance(answer.reply, Status)
+        assert clock.monotonic_s() - began_s > EXCHANGE_DEADLINE_S
+        assert (port.failed_exchange_count, port.must_poll) == (0, False)
+
+    play(story)
+
+
+def stand_still(seconds: float) -> None:
+    """The process gets no processor for so long."""
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualTimeLoop)
+    loop._now_s += seconds
 
 
 def test_a_refusal_is_an_answer() -> None:
