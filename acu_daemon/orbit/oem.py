@@ -5,16 +5,15 @@ by its own method.  Only the Earth as centre, and frames and time systems that a
 """
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import date, timedelta
 from math import isfinite
 from typing import Literal
-from xml.parsers import expat
 
 import numpy as np
 
 from acu_daemon.orbit.element_set import Problem, place
+from acu_daemon.orbit.oem_text import BadSegmentError, RawSegment, read_segments
 from acu_daemon.orbit.timescales import tai_from_utc, unix_from_tai
 from acu_daemon.units import Array
 
@@ -32,7 +31,6 @@ _OF_DATE = ("TEME", "TOD")
 _UNIFORM_MINUS_TAI_S = {"TAI": 0.0, "GPS": -19.0, "TT": 32.184}
 _SUPPORTED_TIMES = "UTC, TAI, TT, GPS"
 _LEAST_STATES = 2
-_STATE_KEYS = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 _DAY_OF_YEAR = re.compile(r"(\d{4})-(\d{3})(T.*)", re.ASCII)
 
@@ -68,26 +66,6 @@ class OemSegment:
         return place(self.file, self.line, None)
 
 
-@dataclass(slots=True)
-class _Raw:
-    """A segment as text."""
-
-    line: int
-    version: str
-    created: str
-    fields: dict[str, str] = field(default_factory=dict)
-    states: list[tuple[int, str, list[str]]] = field(default_factory=list)  # line, epoch, six numbers
-    problem: "_BadSegmentError | None" = None
-
-
-class _BadSegmentError(ValueError):
-    """What is wrong with a segment, or with the whole file; becomes a Problem."""
-
-    def __init__(self, reason: str, line: int | None) -> None:
-        super().__init__(reason)
-        self.line = line
-
-
 def parse_oem(text: str, file: str) -> tuple[list[OemSegment], list[Problem]]:
     """Read every segment of a text, KVN or XML as its first character says.
 
@@ -98,145 +76,30 @@ def parse_oem(text: str, file: str) -> tuple[list[OemSegment], list[Problem]]:
     segments: list[OemSegment] = []
     problems: list[Problem] = []
     try:
-        found = _read_xml(text) if text.lstrip()[:1] == "<" else _read_kvn(text)
-    except _BadSegmentError as error:
+        found = read_segments(text)
+    except BadSegmentError as error:
         return [], [Problem(file, error.line, str(error))]
     for raw in found:
         try:
             segments.append(_segment(raw, file))
-        except _BadSegmentError as error:
+        except BadSegmentError as error:
             problems.append(Problem(file, error.line, str(error)))
     if not found:
         problems.append(Problem(file, None, "no orbit ephemeris message in it (KVN or XML)"))
     return segments, problems
 
 
-def _read_kvn(text: str) -> list[_Raw]:
-    found: list[_Raw] = []
-    where: Literal["header", "meta", "data", "covariance"] = "header"
-    version = created = ""
-    for number, raw_line in enumerate(text.split("\n"), start=1):
-        line = raw_line.strip()
-        word = line.split(maxsplit=1)[0] if line else "COMMENT"
-        if word == "COMMENT":
-            continue
-        if word == "META_START":
-            found.append(_Raw(number, version, created))
-            where = "meta"
-        elif word == "META_STOP":
-            where = "data"
-        elif word in ("COVARIANCE_START", "COVARIANCE_STOP"):
-            where = "covariance" if word == "COVARIANCE_START" else "data"
-        elif word.startswith("CCSDS_OEM_VERS"):
-            where, version, created = "header", line.partition("=")[2].strip(), ""
-        elif where == "header" and word.startswith("CREATION_DATE"):
-            created = line.partition("=")[2].strip()
-        elif where == "meta":
-            _take_field(found[-1], line, number)
-        elif where == "data" and found:
-            _take_state(found[-1], line, number)
-    return found
-
-
-def _take_field(raw: _Raw, line: str, number: int) -> None:
-    key, equals, value = (part.strip() for part in line.partition("="))
-    if equals and key:
-        raw.fields[key] = value
-    else:
-        raw.problem = raw.problem or _BadSegmentError(f"{line[:40]!r} is not KEY = VALUE", number)
-
-
-def _take_state(raw: _Raw, line: str, number: int) -> None:
-    epoch, *values = line.split()
-    if len(values) in (6, 9):  # the last three are accelerations
-        raw.states.append((number, epoch, values[:6]))
-    else:
-        reason = f"{line[:40]!r} is not a time with position and velocity (or accelerations too)"
-        raw.problem = raw.problem or _BadSegmentError(reason, number)
-
-
-def _read_xml(text: str) -> list[_Raw]:
-    """Follow the elements by expat, which knows the lines; a DOCTYPE or an entity's declaration ends it."""
-    reader = _XmlReader()
-    try:
-        reader.parser.Parse(text, True)
-    except expat.ExpatError as error:
-        raise _BadSegmentError(f"not XML: {expat.ErrorString(error.code)}", error.lineno) from None
-    except UnicodeEncodeError:
-        raise _BadSegmentError("not XML: characters that are none", None) from None
-    return reader.found
-
-
-class _XmlReader:
-    """Collects metadata and state vectors of every segment.  Used once."""
-
-    def __init__(self) -> None:
-        self.found: list[_Raw] = []
-        self.parser = expat.ParserCreate()
-        self.parser.StartElementHandler = self._start
-        self.parser.EndElementHandler = self._end
-        self.parser.CharacterDataHandler = self._add_text
-        self.parser.StartDoctypeDeclHandler = self._refuse
-        self._within = ""  # metadata or stateVector
-        self._line = 0
-        self._text: list[str] = []
-        self._leaves: dict[str, str] = {}
-        self._version = ""
-        self._created = ""
-
-    def _refuse(self, *_declaration: object) -> None:
-        reason = "a DOCTYPE or ENTITY declaration: an OEM has none, so the file is not read"
-        raise _BadSegmentError(reason, self.parser.CurrentLineNumber)
-
-    def _start(self, tag: str, attributes: Mapping[str, str]) -> None:
-        name = tag.rpartition(":")[2]
-        self._text = []
-        if name == "segment":
-            self.found.append(_Raw(self.parser.CurrentLineNumber, self._version, self._created))
-        elif name == "oem":
-            self._version = attributes.get("version", "").strip()
-        elif name == "header":
-            self._created = ""
-        elif name in ("metadata", "stateVector"):
-            self._within, self._leaves, self._line = name, {}, self.parser.CurrentLineNumber
-
-    def _add_text(self, text: str) -> None:
-        self._text.append(text)
-
-    def _end(self, tag: str) -> None:
-        name = tag.rpartition(":")[2]
-        if name == "CREATION_DATE":
-            self._created = "".join(self._text).strip()
-        if name != self._within:
-            self._leaves[name] = "".join(self._text).strip()
-            return
-        self._within = ""
-        if not self.found:
-            return
-        raw = self.found[-1]
-        if name == "metadata":
-            raw.fields = self._leaves
-            return
-        missing = [key for key in ("EPOCH", *_STATE_KEYS) if key not in self._leaves]
-        if missing:
-            raw.problem = raw.problem or _BadSegmentError(f"a stateVector without {missing[0]}", self._line)
-        else:
-            raw.states.append((self._line, self._leaves["EPOCH"], [self._leaves[key] for key in _STATE_KEYS]))
-
-
-def _segment(raw: _Raw, file: str) -> OemSegment:
+def _segment(raw: RawSegment, file: str) -> OemSegment:
     if raw.problem is not None:
         raise raw.problem
     frame, system = _frame(raw), _time_system(raw)
     if len(raw.states) < _LEAST_STATES:
-        raise _BadSegmentError(
-            f"{len(raw.states)} states in the segment, at least {_LEAST_STATES} are needed", raw.line
-        )
+        raise BadSegmentError(f"{len(raw.states)} states in the segment, at least {_LEAST_STATES} are needed", raw.line)
     tai_s = np.array([_tai_s(epoch, system, line) for line, epoch, _ in raw.states])
     falling = np.flatnonzero(np.diff(tai_s) <= 0.0)
     if falling.size:
         line, epoch, _ = raw.states[int(falling[0]) + 1]
-        raise _BadSegmentError(f"the times must rise, {epoch} does not", line)
+        raise BadSegmentError(f"the times must rise, {epoch} does not", line)
     states = np.array([_numbers(values, line) for line, _, values in raw.states]) * 1e3
     start_tai_s, end_tai_s = _span_tai_s(raw, system, tai_s)
     return OemSegment(
@@ -255,35 +118,35 @@ def _segment(raw: _Raw, file: str) -> OemSegment:
     )
 
 
-def _frame(raw: _Raw) -> Frame:
+def _frame(raw: RawSegment) -> Frame:
     centre = _field(raw, "CENTER_NAME")
     if centre.upper() != "EARTH":
-        raise _BadSegmentError(f"CENTER_NAME is {centre[:40]!r}; only EARTH can be used", raw.line)
+        raise BadSegmentError(f"CENTER_NAME is {centre[:40]!r}; only EARTH can be used", raw.line)
     name = _field(raw, "REF_FRAME")
     plain = name.upper().replace(" ", "")
     frame = next((frame for pattern, frame in _FRAMES if re.fullmatch(pattern, plain)), None)
     if frame is None:
-        raise _BadSegmentError(f"REF_FRAME is {name[:40]!r}; {_SUPPORTED_FRAMES} can be used", raw.line)
+        raise BadSegmentError(f"REF_FRAME is {name[:40]!r}; {_SUPPORTED_FRAMES} can be used", raw.line)
     if frame in _OF_DATE and raw.fields.get("REF_FRAME_EPOCH"):
-        raise _BadSegmentError(f"REF_FRAME_EPOCH: {frame} can be used of date only, not of one epoch", raw.line)
+        raise BadSegmentError(f"REF_FRAME_EPOCH: {frame} can be used of date only, not of one epoch", raw.line)
     return frame
 
 
-def _time_system(raw: _Raw) -> str:
+def _time_system(raw: RawSegment) -> str:
     system = _field(raw, "TIME_SYSTEM").upper()
     if system != "UTC" and system not in _UNIFORM_MINUS_TAI_S:
-        raise _BadSegmentError(f"TIME_SYSTEM is {system[:40]!r}; {_SUPPORTED_TIMES} can be used", raw.line)
+        raise BadSegmentError(f"TIME_SYSTEM is {system[:40]!r}; {_SUPPORTED_TIMES} can be used", raw.line)
     return system
 
 
-def _field(raw: _Raw, key: str) -> str:
+def _field(raw: RawSegment, key: str) -> str:
     value = raw.fields.get(key, "")
     if not value:
-        raise _BadSegmentError(f"{key} is missing", raw.line)
+        raise BadSegmentError(f"{key} is missing", raw.line)
     return value
 
 
-def _span_tai_s(raw: _Raw, system: str, tai_s: Array) -> tuple[float, float]:
+def _span_tai_s(raw: RawSegment, system: str, tai_s: Array) -> tuple[float, float]:
     """The useable span, within the states; without one, that of the states."""
     first, last = float(tai_s[0]), float(tai_s[-1])
     if start := raw.fields.get("USEABLE_START_TIME"):
@@ -291,15 +154,15 @@ def _span_tai_s(raw: _Raw, system: str, tai_s: Array) -> tuple[float, float]:
     if stop := raw.fields.get("USEABLE_STOP_TIME"):
         last = min(last, _tai_s(stop, system, raw.line))
     if first >= last:
-        raise _BadSegmentError("USEABLE_START_TIME to USEABLE_STOP_TIME leaves nothing of the states", raw.line)
+        raise BadSegmentError("USEABLE_START_TIME to USEABLE_STOP_TIME leaves nothing of the states", raw.line)
     return first, last
 
 
-def _created_tai_s(raw: _Raw) -> float | None:
+def _created_tai_s(raw: RawSegment) -> float | None:
     """None where the header has no such date, or no date that can be read."""
     try:
         return _tai_s(raw.created, "UTC", raw.line)
-    except _BadSegmentError:
+    except BadSegmentError:
         return None
 
 
@@ -308,7 +171,7 @@ def _tai_s(text: str, system: str, line: int) -> float:
     try:
         tai_s = tai_from_utc(_calendar(text).removesuffix("Z") + "Z")
     except ValueError as error:
-        raise _BadSegmentError(f"{text[:40]!r} is not a time: {error}", line) from None
+        raise BadSegmentError(f"{text[:40]!r} is not a time: {error}", line) from None
     if system == "UTC":
         return tai_s
     as_uniform_s = unix_from_tai(tai_s) - unix_from_tai(tai_from_utc("2000-01-01T12:00:00Z"))
@@ -333,5 +196,5 @@ def _calendar(text: str) -> str:
 def _numbers(values: list[str], line: int) -> list[float]:
     for text in values:
         if _NUMBER.fullmatch(text) is None or not isfinite(float(text)):
-            raise _BadSegmentError(f"{text[:40]!r} is not a number", line)
+            raise BadSegmentError(f"{text[:40]!r} is not a number", line)
     return [float(text) for text in values]

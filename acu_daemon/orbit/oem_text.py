@@ -1,0 +1,146 @@
+"""The text of an orbit ephemeris message, KVN or XML: its segments, still as text, with the lines they stand in."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+from xml.parsers import expat
+
+STATE_KEYS = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
+
+
+class BadSegmentError(ValueError):
+    """What is wrong with a segment, or with the whole file; becomes a Problem."""
+
+    def __init__(self, reason: str, line: int | None) -> None:
+        super().__init__(reason)
+        self.line = line
+
+
+@dataclass(slots=True)
+class RawSegment:
+    """A segment as text."""
+
+    line: int
+    version: str
+    created: str
+    fields: dict[str, str] = field(default_factory=dict)
+    states: list[tuple[int, str, list[str]]] = field(default_factory=list)  # line, epoch, six numbers
+    problem: BadSegmentError | None = None
+
+
+def read_segments(text: str) -> list[RawSegment]:
+    """Read the segments, KVN or XML as the first character says.  BadSegmentError: the whole file cannot be read."""
+    return _read_xml(text) if text.lstrip()[:1] == "<" else _read_kvn(text)
+
+
+def _read_kvn(text: str) -> list[RawSegment]:
+    found: list[RawSegment] = []
+    where: Literal["header", "meta", "data", "covariance"] = "header"
+    version = created = ""
+    for number, raw_line in enumerate(text.split("\n"), start=1):
+        line = raw_line.strip()
+        word = line.split(maxsplit=1)[0] if line else "COMMENT"
+        if word == "COMMENT":
+            continue
+        if word == "META_START":
+            found.append(RawSegment(number, version, created))
+            where = "meta"
+        elif word == "META_STOP":
+            where = "data"
+        elif word in ("COVARIANCE_START", "COVARIANCE_STOP"):
+            where = "covariance" if word == "COVARIANCE_START" else "data"
+        elif word.startswith("CCSDS_OEM_VERS"):
+            where, version, created = "header", line.partition("=")[2].strip(), ""
+        elif where == "header" and word.startswith("CREATION_DATE"):
+            created = line.partition("=")[2].strip()
+        elif where == "meta":
+            _take_field(found[-1], line, number)
+        elif where == "data" and found:
+            _take_state(found[-1], line, number)
+    return found
+
+
+def _take_field(raw: RawSegment, line: str, number: int) -> None:
+    key, equals, value = (part.strip() for part in line.partition("="))
+    if equals and key:
+        raw.fields[key] = value
+    else:
+        raw.problem = raw.problem or BadSegmentError(f"{line[:40]!r} is not KEY = VALUE", number)
+
+
+def _take_state(raw: RawSegment, line: str, number: int) -> None:
+    epoch, *values = line.split()
+    if len(values) in (6, 9):  # the last three are accelerations
+        raw.states.append((number, epoch, values[:6]))
+    else:
+        reason = f"{line[:40]!r} is not a time with position and velocity (or accelerations too)"
+        raw.problem = raw.problem or BadSegmentError(reason, number)
+
+
+def _read_xml(text: str) -> list[RawSegment]:
+    """Follow the elements by expat, which knows the lines; a DOCTYPE or an entity's declaration ends it."""
+    reader = _XmlReader()
+    try:
+        reader.parser.Parse(text, True)
+    except expat.ExpatError as error:
+        raise BadSegmentError(f"not XML: {expat.ErrorString(error.code)}", error.lineno) from None
+    except UnicodeEncodeError:
+        raise BadSegmentError("not XML: characters that are none", None) from None
+    return reader.found
+
+
+class _XmlReader:
+    """Collects metadata and state vectors of every segment.  Used once."""
+
+    def __init__(self) -> None:
+        self.found: list[RawSegment] = []
+        self.parser = expat.ParserCreate()
+        self.parser.StartElementHandler = self._start
+        self.parser.EndElementHandler = self._end
+        self.parser.CharacterDataHandler = self._add_text
+        self.parser.StartDoctypeDeclHandler = self._refuse
+        self._within = ""  # metadata or stateVector
+        self._line = 0
+        self._text: list[str] = []
+        self._leaves: dict[str, str] = {}
+        self._version = ""
+        self._created = ""
+
+    def _refuse(self, *_declaration: object) -> None:
+        reason = "a DOCTYPE or ENTITY declaration: an OEM has none, so the file is not read"
+        raise BadSegmentError(reason, self.parser.CurrentLineNumber)
+
+    def _start(self, tag: str, attributes: Mapping[str, str]) -> None:
+        name = tag.rpartition(":")[2]
+        self._text = []
+        if name == "segment":
+            self.found.append(RawSegment(self.parser.CurrentLineNumber, self._version, self._created))
+        elif name == "oem":
+            self._version = attributes.get("version", "").strip()
+        elif name == "header":
+            self._created = ""
+        elif name in ("metadata", "stateVector"):
+            self._within, self._leaves, self._line = name, {}, self.parser.CurrentLineNumber
+
+    def _add_text(self, text: str) -> None:
+        self._text.append(text)
+
+    def _end(self, tag: str) -> None:
+        name = tag.rpartition(":")[2]
+        if name == "CREATION_DATE":
+            self._created = "".join(self._text).strip()
+        if name != self._within:
+            self._leaves[name] = "".join(self._text).strip()
+            return
+        self._within = ""
+        if not self.found:
+            return
+        raw = self.found[-1]
+        if name == "metadata":
+            raw.fields = self._leaves
+            return
+        missing = [key for key in ("EPOCH", *STATE_KEYS) if key not in self._leaves]
+        if missing:
+            raw.problem = raw.problem or BadSegmentError(f"a stateVector without {missing[0]}", self._line)
+        else:
+            raw.states.append((self._line, self._leaves["EPOCH"], [self._leaves[key] for key in STATE_KEYS]))
