@@ -9,7 +9,7 @@ from acu_daemon.control.state import ControlConfig, ControlState, Event, Observa
 from acu_daemon.model import Reading
 from acu_daemon.pointing.wrap import encoder_continuous
 from acu_daemon.protocol.angles import LSB_DEG
-from acu_daemon.protocol.messages import AcuMode, Backup, Nak, Status
+from acu_daemon.protocol.messages import AcuMode, Backup, Nak, Status, Stop
 from acu_daemon.units import wrap_180
 
 OFFSET_GAIN = 0.6  # of the newest reading in the smoothed distance to the prediction: autotrack pulls in quickly
@@ -33,7 +33,7 @@ def absorb(
         state = _absorb_encoders(state, sky, seen.status, seen.reading, events)
     if seen.extra is not None:
         state = after_reply(state, seen.extra, config, events)
-        if isinstance(seen.extra.reply, Nak):
+        if isinstance(seen.extra.reply, Nak) and not isinstance(seen.extra.command, Stop):
             state = replace(state, extra_after_tai_s=now_tai_s + REFUSED_EXTRA_S)
     return state
 

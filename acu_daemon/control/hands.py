@@ -26,13 +26,15 @@ def obey(state: ControlState, requests: Iterable[Request], config: ControlConfig
     for request in requests:
         if request is Request.CLEAR and state.latch:
             events.append(Event("latch.cleared", {"latch": state.latch}))
-            state = replace(_anew(state), latch="", is_stop_due=False)
+            is_stop_due = state.is_stop_due and not state.is_armed(config)
+            state = replace(_anew(state), latch="", is_stop_due=is_stop_due)
         elif request is Request.ARM and not config.is_shadow and not state.is_armed(config):
             events.append(Event("armed"))
-            state = replace(_anew(state), arming=True, disarmed_by="", is_stop_due=False)
+            is_stop_due = state.is_stop_due and bool(state.latch)
+            state = replace(_anew(state), arming=True, disarmed_by="", is_stop_due=is_stop_due)
         elif request is Request.DISARM and state.is_armed(config):
             state = _disarm(state, "a person", events)
-            state = replace(state, is_stop_due=state.in_force is not None)
+            state = replace(state, is_stop_due=state.is_stop_due or state.in_force is not None)
     return state
 
 

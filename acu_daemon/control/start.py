@@ -109,7 +109,8 @@ def _after_watchdog(
 ) -> ControlState:
     """The watchdog counts as set when it was read back; a clean stop has written 0."""
     if extra.command == WriteParameter(WATCHDOG, 0):
-        return replace(state, watchdog=Watchdog.UNKNOWN)
+        is_done = is_refused or isinstance(extra.reply, Ack)
+        return replace(state, watchdog=Watchdog.UNKNOWN) if is_done else state
     if extra.reply == Parameter(WATCHDOG, watchdog_code(config)):
         return replace(state, watchdog=Watchdog.SET, watchdog_try_count=0)
     count = state.watchdog_try_count + 1

@@ -214,10 +214,16 @@ class Foreground:
         ):
             self._log.info("acu.command", command=command_text(command))
 
+    @property
+    def owes_stop(self) -> bool:
+        """Whether the antenna obeys us, or a STOP for it was not acknowledged yet."""
+        state = self._area.state
+        return state.is_stop_due or (self.write_count > 0 and state.is_armed(self._config))
+
     async def safe_stop(self) -> bool:
-        """Stop the antenna, unless it never obeyed us or does so no more.  True: stopped, or nothing to stop."""
+        """Stop the antenna.  True: stopped, or left to somebody else; False: nobody knows."""
         state, config = self._area.state, self._config
-        if self.write_count == 0 or state.status is None or not state.is_armed(config):
-            return True
+        if state.status is None:
+            return False
         clears_watchdog = config.register_watchdog_s > 0.0 and state.watchdog is not Watchdog.REFUSED
         return await stop_antenna(self._port, state.status, clears_watchdog=clears_watchdog)

@@ -195,7 +195,7 @@ class Service:
 
     async def _safe_stop(self) -> bool:
         self._port.abandon()
-        if self._foreground.write_count == 0:
+        if not self._foreground.owes_stop:
             return True
         try:
             async with asyncio.timeout(STOP_DEADLINE_S):

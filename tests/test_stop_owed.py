@@ -1,0 +1,102 @@
+"""P1, P6: a STOP that is owed, and the end of the watchdog, are not lost by another word, a refusal or the end."""
+
+from dataclasses import replace
+
+import pytest
+from flights import RISING_TAI_S, climb, commands_between
+from test_hands import GUARDED, latched, moving
+from test_tick import FITTED, NOW, SKY, saw, status
+
+from acu_daemon.cli.virtual_pass import Stage as Rigged
+from acu_daemon.control.state import ControlState, Exchange, Observation, Request, Stage
+from acu_daemon.control.tick import tick
+from acu_daemon.protocol.messages import AcuMode, Command, Nak, Reply, Status, Stop, WriteParameter
+
+T = RISING_TAI_S
+SILENT_S = 9.0
+
+
+def asked(state: ControlState, *requests: Request) -> ControlState:
+    """What a person says while the link is down."""
+    return tick(state, Observation(silence_s=SILENT_S, requests=requests), SKY, NOW, GUARDED)[0]
+
+
+@pytest.mark.parametrize(
+    "requests",
+    [
+        (Request.DISARM,),
+        (Request.DISARM, Request.ARM),
+        (Request.DISARM, Request.CLEAR),
+    ],
+    ids=lambda requests: " ".join(requests),
+)
+def test_p6_the_stop_of_a_latch_that_was_not_acknowledged_yet_outlives_what_a_person_says(requests) -> None:
+    assert asked(latched(), *requests).is_stop_due
+    assert asked(replace(latched(), in_force=None), *requests).is_stop_due  # in a daemon that was started again
+
+
+@pytest.mark.parametrize("requests", [(Request.CLEAR,), (Request.DISARM, Request.CLEAR, Request.ARM)])
+def test_cleared_and_armed_the_daemon_goes_on_and_owes_no_stop(requests) -> None:
+    assert not asked(latched(), *requests).is_stop_due
+
+
+def extras(state: ControlState, seen: Status, reply: Reply | None) -> list[Command | None]:
+    """Two seconds against an ACU that gives every extra exchange the same reply, or none."""
+    sent: list[Command | None] = []
+    extra = None
+    for k in range(20):
+        observed = saw(seen, extra=extra)
+        observed = replace(observed, reading=replace(observed.reading, tai_s=NOW + 0.1 * k))
+        state, orders = tick(state, observed, FITTED, NOW + 0.1 * (k + 1), GUARDED)
+        extra = Exchange(orders.extra, reply) if orders.extra is not None else None
+        sent.append(orders.extra)
+    return sent
+
+
+def test_p6_a_stop_that_was_garbled_into_a_refusal_is_repeated_at_once() -> None:
+    assert extras(latched(), status(AcuMode.REMOTE), Nak()).count(Stop()) >= 5
+
+
+def test_the_register_watchdog_is_cleared_again_when_nobody_answered_but_not_for_ever_when_it_is_refused() -> None:
+    disarmed = replace(moving(), arming=False, stage=Stage.REGISTERS_KNOWN)
+    cleared = WriteParameter("W", 0)
+    assert extras(disarmed, status(AcuMode.STANDBY), None).count(cleared) >= 5
+    assert extras(disarmed, status(AcuMode.STANDBY), Nak()).count(cleared) == 1
+
+
+# In flight
+
+
+def says(line: str):
+    return lambda stage: (stage.service.answer(line), None)[1]
+
+
+def cut(is_cut: bool):
+    return lambda stage: setattr(stage.link, "is_cut", is_cut)
+
+
+def ends(stage: Rigged) -> None:
+    stage.service.stop("SIGTERM")
+
+
+@pytest.mark.parametrize("back_s", [18.0, 60.0], ids=["the link comes back", "it does not"])
+def test_p1_disarmed_and_ended_while_the_link_is_down_it_is_stopped_or_the_end_is_no_success(back_s: float) -> None:
+    script = [(15.0, cut(True)), (16.0, says("disarm")), (17.0, ends), (back_s, cut(False))]
+    flight = climb(30.0, losses=[(12.0, 60.0)], script=script)
+    is_back = back_s < 30.0
+    assert flight.outcome is not None
+    assert flight.outcome.is_stopped is is_back
+    assert (Stop() in commands_between(flight, T + 16.0, T + 30.0)) is is_back
+
+
+def test_p1_disarmed_and_ended_before_stop_was_acknowledged_it_is_stopped() -> None:
+    silence = "no-reply start_s=14.95 duration_s=0.2"
+    flight = climb(30.0, faults=[silence], script=[(15.0, says("disarm")), (15.15, ends)])
+    assert Stop() in commands_between(flight, T + 15.15, T + 30.0)
+
+
+def test_disarmed_and_stopped_it_ends_at_once_though_the_link_is_down() -> None:
+    flight = climb(30.0, script=[(12.0, says("disarm")), (15.0, cut(True)), (17.0, ends)])
+    assert flight.outcome is not None
+    assert flight.outcome.is_stopped
+    assert flight.rows[-1].tai_s < T + 18.0
