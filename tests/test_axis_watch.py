@@ -45,6 +45,10 @@ def ticks(seconds: float) -> list[float]:
     return [TICK_S * k for k in range(round(seconds / TICK_S))]
 
 
+def test_p6_beyond_the_zenith_a_degree_of_azimuth_is_as_much_on_the_sky_as_before_it() -> None:
+    assert sky_scale(140.0) == pytest.approx(sky_scale(40.0))
+
+
 @pytest.mark.parametrize("rate_deg_s", [0.3, 2.0, 20.0, -5.0])
 def test_p6_an_axis_that_stands_still_is_found_two_seconds_after_its_command_left_it_by_a_degree(rate_deg_s) -> None:
     found = follow([min(rate_deg_s * t, 10.0) for t in ticks(10.0)], [0.0 for _ in ticks(10.0)])

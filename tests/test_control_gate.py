@@ -64,6 +64,15 @@ def test_a_bad_azimuth_is_refused_with_a_reason_and_the_last_good_value_stays(ba
     assert passed.az.position_deg == pytest.approx(100.0, abs=RATE_TOLERANCE_DEG)
 
 
+def test_p5_a_followed_register_that_stood_through_a_refusal_begins_again_from_a_standstill():
+    state = at(100.0, 45.0, az_rate=5.0, el_rate=3.0)
+    passed = gate(Pointing(nan, 45.3, 5.0, 3.0), state, 0.0, is_followed=True, dt_s=DT_S, config=CONFIG)
+    assert (passed.az.rate_deg_s, passed.el.rate_deg_s) == (0.0, 0.0)
+    state = replace(state, axis_az=passed.az, axis_el=passed.el)
+    passed = gate(Pointing(100.5, 45.6, 5.0, 3.0), state, 0.0, is_followed=True, dt_s=DT_S, config=CONFIG)
+    assert passed.el.rate_deg_s <= 5.0 * DT_S
+
+
 def test_a_hair_below_the_horizon_is_sent_as_the_limit_not_as_359_999():
     passed = gate(Pointing(0.0, -0.001, 0.0, 0.0), at(0.0, 0.0), 0.0, is_followed=False, dt_s=DT_S, config=CONFIG)
     assert passed.el.position_deg == 0.0

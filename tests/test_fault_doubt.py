@@ -41,6 +41,12 @@ def told(*statuses: Status, apart_s: float = 0.1) -> list[bool]:
     return [doubt.believes(status, 1000.0 + i * apart_s) for i, status in enumerate(statuses)]
 
 
+@pytest.mark.parametrize("el_deg", [-5.0, 40.0, 140.0])
+def test_an_azimuth_that_outruns_its_drive_is_doubted_at_any_elevation(el_deg: float) -> None:
+    here = replace(HOLDING, el_deg=el_deg)
+    assert told(here, replace(here, az_deg=112.0), here) == [True, False, True]
+
+
 @pytest.mark.parametrize(
     ("change", "found"),
     [

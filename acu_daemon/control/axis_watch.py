@@ -204,4 +204,4 @@ def _open(gap_deg: float | None, is_at_max: bool, is_at_min: bool) -> float | No
 
 def sky_scale(el_deg: float) -> float:
     """How many degrees on the sky a degree of azimuth is."""
-    return max(cos(radians(el_deg)), LEAST_COS_EL)
+    return max(abs(cos(radians(el_deg))), LEAST_COS_EL)  # beyond the zenith as before it

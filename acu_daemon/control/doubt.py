@@ -5,15 +5,13 @@ axis where no drive can have brought it counts only when the next one agrees, an
 mode may be anything, when half a second of them agree.
 """
 
-from math import cos, radians
-
+from acu_daemon.control.axis_watch import sky_scale
 from acu_daemon.model import AxisLimits
 from acu_daemon.protocol.messages import AcuMode, Backup, Status
 from acu_daemon.units import wrap_180
 
 MOVED_COUNT, CONTRADICTING_COUNT = 2, 5  # in a row, before they are believed
 SLACK_DEG = 1.0  # on the sky: noise, and more is left to the gate of readings
-LEAST_COS_EL = 0.01
 RATE_MARGIN = 1.5  # of the drive's rate
 BACKUP_MODES = (AcuMode.RATE_MEMORY, AcuMode.POSITION_MEMORY, AcuMode.REMOTE_BACKUP)
 SELECTED_MODES = (AcuMode.ACQUIRE, AcuMode.AUTOTRACK)  # autotrack is selected in these, and in the backup modes
@@ -77,7 +75,7 @@ class Doubt:
         span_s = max(tai_s - before[0], 0.0)
         az_deg = abs(wrap_180(status.az_deg - before[1].az_deg))
         el_deg = abs(status.el_deg - before[1].el_deg)
-        az_slack_deg = SLACK_DEG / max(cos(radians(status.el_deg)), LEAST_COS_EL)
+        az_slack_deg = SLACK_DEG / sky_scale(status.el_deg)
         for name, moved_deg, slack_deg, limits in (
             ("azimuth", az_deg, az_slack_deg, self._azimuth),
             ("elevation", el_deg, SLACK_DEG, self._elevation),

@@ -42,7 +42,8 @@ def gate(
     az, el = _from(state, now_tai_s, is_followed=is_followed)
     refusal = _refusal(wanted, config)
     if refusal:
-        return Passed(_legal(replace(az, rate_deg_s=0.0), config.azimuth), _legal(el, config.elevation), True, refusal)
+        az, el = replace(az, rate_deg_s=0.0), replace(el, rate_deg_s=0.0)
+        return Passed(_legal(az, config.azimuth), _legal(el, config.elevation), True, refusal)
     new_az, new_el = (
         AxisState(wanted.az_deg, wanted.az_rate_deg_s),
         AxisState(wanted.el_deg, wanted.el_rate_deg_s),
