@@ -90,6 +90,7 @@ class Judge:
         state = self._rig.state
         if line == "clear" and (state.latch or self.is_latched):
             self.is_latched = self._is_present = self._is_read_back = False
+            self._is_clearing = True
         if line == "arm" and not state.is_armed(self._rig.config):
             self._is_present = self._is_read_back = False
         if line in ("arm", "disarm"):
@@ -97,6 +98,7 @@ class Judge:
             self._will_disarm_s = self._now_s if line == "disarm" else None
 
     _will_disarm_s: float | None = None
+    _is_clearing = False  # asked for in the middle of a tick, it is done by the next one
 
     def stalled(self, time_s: float) -> None:
         self._stalled_s = self._now_s + time_s
@@ -212,7 +214,8 @@ class Judge:
         silent_s, is_fresh = now_s - self._heard_s, now_s - self._stalled_s < 1.0
         if silent_s > SILENT_S and not is_fresh and seen.state != "LINK-LOST":
             self._break("P2", f"{seen.state} after {silent_s:.2f} s of silence")
-        self.is_latched |= bool(seen.latch)
+        self._is_clearing &= bool(seen.latch)
+        self.is_latched |= bool(seen.latch) and not self._is_clearing
         if self._will_disarm_s is not None and now_s - self._will_disarm_s > 0.25:
             self._will_disarm_s, self.is_disarmed = None, True
         self._judge_clock(seen)
