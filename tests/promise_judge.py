@@ -72,7 +72,9 @@ class Judge:
         self.opened()
 
     def crashed(self) -> None:
-        """What could not be saved may be forgotten."""
+        """What could not be saved may be forgotten, and what was asked for in the tick of the crash."""
+        if read_run_state(self._rig.directory).arming is not False:
+            self._will_disarm_s = None
         if self.may_forget:
             self.is_latched = self.is_disarmed = False
 
