@@ -44,3 +44,17 @@ def test_nothing_learned_gives_the_prior():
 def test_a_jump_of_the_encoder_is_not_taken_for_a_lag():
     estimate = learn(0.02, 1.0, 30.0)
     assert estimate.seen(0.1, 10.0) == estimate
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_few_readings_of_a_line_in_trouble_pretend_no_lag(count: int):
+    """Each tells of an antenna four steps behind, 0.4 s at 0.55 deg/s: 0.2 deg of lead, if it were believed."""
+    estimate = LagEstimate()
+    for _ in range(count):
+        estimate = estimate.seen(0.055, 0.2)
+    assert (estimate.lag_s(PHASE_S, PERIOD_S) - PRIOR_LAG_S) * 0.55 < 0.03
+
+
+@pytest.mark.parametrize("lag_s", [0.02, 0.05, 0.1])
+def test_a_real_lag_is_learned_within_ten_seconds(lag_s):
+    assert learn(lag_s, 0.5, 12.0).lag_s(PHASE_S, PERIOD_S) == pytest.approx(lag_s, abs=0.006)

@@ -119,6 +119,20 @@ def test_a_late_tick_aims_for_the_moment_it_really_writes() -> None:
     assert orders.first.az_deg == pytest.approx(AZ_DEG + AZ_RATE * (0.35 + LEAD_S), abs=LSB_DEG)
 
 
+@pytest.mark.parametrize(("gap_s", "is_learned"), [(0.1, True), (0.13, False), (0.2, False)])
+def test_a_lag_is_learned_only_from_writes_that_come_a_period_apart(gap_s: float, is_learned: bool) -> None:
+    """The stairs of a daemon that gets no processor, or of a line in trouble, are not those that the lag is read from."""
+    state = replace(ready(TrackState.HOLD_FITTED, status(AcuMode.REMOTE_BACKUP)), hold_from_tai_s=NOW)
+    for k in range(30):
+        now_tai_s = NOW + k * gap_s
+        az_deg, el_deg = AZ_DEG + AZ_RATE * (k * gap_s - 0.05), EL_DEG + EL_RATE * (k * gap_s - 0.05)
+        seen = replace(status(AcuMode.REMOTE_BACKUP), az_deg=az_deg, el_deg=el_deg)
+        reading = Reading(now_tai_s - gap_s, az_deg, el_deg, is_locked=False)
+        state, _ = tick(state, Observation(reading=reading, status=seen), FITTED, now_tai_s, CONFIG)
+    assert (state.lag_az.count > 0) is is_learned
+    assert (state.lag_el.count > 0) is is_learned
+
+
 def test_the_tilt_register_goes_back_as_it_was_read() -> None:
     seen = status()
     _, orders = tick(replace(ready(TrackState.IDLE, seen), tilt_code=4321), saw(seen), Sky(), NOW, CONFIG)

@@ -15,6 +15,7 @@ MAX_LAG_S = 0.5
 PRIOR_LAG_S = 0.0125  # half of the greatest following error of ICD section 5
 PRIOR_SIGMA_S = 0.0075
 CODE_SIGMA_DEG = 0.0016  # of rounding an angle to 16 bits: the least noise a reading has
+DOUBT_COUNT, DOUBT_SIGMA_DEG = 10, 0.02  # few readings agree by chance: as if so many of this noise were among them
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +51,8 @@ def _most_likely_lag_s(seen: LagEstimate, phase_s: float, period_s: float) -> fl
     if seen.sum_ss_deg2 <= 0.0:
         return PRIOR_LAG_S
     g = seen.sum_sx_deg2 / seen.sum_ss_deg2
-    noise_deg2 = max(seen.sum_xx_deg2 - g * seen.sum_sx_deg2, 0.0) / seen.count + CODE_SIGMA_DEG**2
-    weight = seen.sum_ss_deg2 / noise_deg2
+    rest_deg2 = max(seen.sum_xx_deg2 - g * seen.sum_sx_deg2, 0.0) + DOUBT_COUNT * DOUBT_SIGMA_DEG**2
+    weight = seen.sum_ss_deg2 / (rest_deg2 / (seen.count + DOUBT_COUNT) + CODE_SIGMA_DEG**2)
 
     def misfit(candidate: tuple[float, float]) -> float:
         lag_s, shortfall = candidate

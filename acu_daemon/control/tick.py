@@ -4,6 +4,7 @@
 they take effect, and passes it through the safety gate.  control.state is its memory, control.states the table.
 """
 
+import math
 from dataclasses import replace
 
 from acu_daemon.control.absorb import absorb
@@ -42,6 +43,7 @@ from acu_daemon.protocol.messages import Command, Poll, WriteAndPoll
 EXTRA_REPEAT_S = 0.3  # a command gets this long to show in the status before it is sent again
 EXTRA_SETTLED_S = 0.7  # after that; a status that still contradicts itself means it
 SETTLE_S = 1.0  # after a change of state the servo takes up the path: what it is short of then is no lag
+REGULAR_SHARE = 0.1  # of the period: of writes that come less regularly no lag is learned
 CALM_SHARE = 0.25  # of the drive's rate: above it a lag is what the drive cannot do, not what it does late
 
 
@@ -192,7 +194,9 @@ def _sent(
         and abs(passed.el.rate_deg_s) < CALM_SHARE * config.elevation.max_rate_deg_s
     )
     is_settled = now_tai_s - state.entered_tai_s > SETTLE_S
-    is_free = is_calm and is_settled and is_followed and state.was_followed and not passed.is_held_back
+    since_s = now_tai_s - (state.last_write_tai_s or -math.inf)
+    is_regular = abs(since_s - config.period_s) < REGULAR_SHARE * config.period_s
+    is_free = is_calm and is_settled and is_regular and is_followed and state.was_followed and not passed.is_held_back
     sent = Sent(az_deg, el_deg, is_free)
     state = replace(
         state,
