@@ -246,13 +246,12 @@ class Rig:
         self.daemon_clock = RigClock(self)
         target = self.scene.target
         if self._runs_on:
-            before, self.coming = self.coming, coming_pass(target, self.daemon_clock.tai_s())
-            self.judge.is_disarmed &= before == self.coming  # by a person, for one pass
+            self.coming = coming_pass(target, self.daemon_clock.tai_s())
         kept = self._kept = open_kept(self.directory, target, self.coming, self.daemon_clock, RigWriter())  # type: ignore[arg-type]
         self.link = RigLink(self, self.acu, self.clock, self.board)
         job = make_job(target, self.coming, self.link, is_rehearsal=False, carried=kept.carried)
         job = replace(job, control=replace(job.control, is_armed=self.is_armed_at_start))
-        job = replace(job, arming=kept.arming, latch=kept.latch)
+        job = replace(job, state=kept.state)
         self.config = job.control
         self.judge.started()
         self.service = Service(

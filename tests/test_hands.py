@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from test_tick import CONFIG, FITTED, NOW, SKY, ready, saw, status
 
 from acu_daemon.control.fence import READS, refusal
-from acu_daemon.control.state import ControlState, Exchange, Observation, Orders, Request, Stage, Watchdog
+from acu_daemon.control.state import ControlState, Exchange, Held, Observation, Orders, Request, Stage, Watchdog
 from acu_daemon.control.states import ACTIVE, TrackState
 from acu_daemon.control.tick import tick
 from acu_daemon.protocol.messages import (
@@ -44,7 +44,9 @@ def moving(track: TrackState = TrackState.HOLD_FITTED, mode: AcuMode = AcuMode.R
     """A daemon whose writes the antenna follows."""
     before = status(mode)
     state = ready(track, before)
-    return replace(state, reading=saw(before).reading, in_force=(NOW - 0.1, 100.0, 40.0), watchdog=Watchdog.SET)
+    return replace(
+        state, reading=saw(before).reading, in_force=(NOW - 0.1, 100.0, 40.0), watchdog=Watchdog.SET, held=Held()
+    )
 
 
 def run(
@@ -193,9 +195,70 @@ def test_standby_by_the_acus_own_doing_is_no_stop(seen: Status) -> None:
     assert state.is_armed(GUARDED)
 
 
-def test_standby_after_registers_went_unwritten_is_no_stop() -> None:
-    state = replace(moving(), in_force=(NOW - 5.0, 100.0, 40.0))
-    assert run(state, status(AcuMode.STANDBY))[0].is_armed(GUARDED)
+@pytest.mark.parametrize(
+    ("unwritten_s", "had_fault", "has_fault", "is_armed"),
+    [
+        (6.0, False, True, True),
+        (6.0, True, True, True),  # the bit stood before: a second watchdog trip, or a STOP; nothing tells
+        (6.0, False, False, False),
+        (2.0, True, True, False),  # too soon for the watchdog
+        (0.1, True, True, False),
+        (2.0, False, False, False),
+    ],
+)
+@pytest.mark.parametrize("track", [TrackState.LINK_LOST, TrackState.HOLD_FITTED], ids=["no link", "hang"])
+def test_p1_standby_after_an_outage_is_a_stop_unless_the_register_watchdog_shows(
+    unwritten_s: float, had_fault: bool, has_fault: bool, is_armed: bool, track: TrackState
+) -> None:
+    state = replace(moving(), held=Held(had_fault), in_force=(NOW - unwritten_s, 100.0, 40.0), track=track)
+    state = replace(state, stage=Stage.NEW if track is TrackState.LINK_LOST else Stage.READY)
+    state, sent = run(state, status(AcuMode.STANDBY, has_interlock_fault=has_fault), 5)
+    assert state.is_armed(GUARDED) is is_armed
+    assert is_armed or orders_of(sent) in ([], [WriteParameter("W", 0)])
+
+
+HELD = Held()
+
+
+def started_again(seen: Status, held: Held | None = HELD, **first) -> tuple[ControlState, list[Command]]:
+    """A new daemon on what a crash left; it comes as far as the registers."""
+    return run(ControlState(held=held), seen, 12, **first)
+
+
+def test_p1_a_stop_while_the_daemon_was_dead_disarms_it() -> None:
+    state, sent = started_again(status(AcuMode.STANDBY))
+    assert (state.is_armed(GUARDED), state.disarmed_by) == (False, "another hand that stopped the antenna")
+    assert orders_of(sent) == []
+
+
+@pytest.mark.parametrize(
+    ("seen", "held"),
+    [
+        (status(AcuMode.STANDBY, has_interlock_fault=True), Held()),
+        (status(AcuMode.STANDBY, has_interlock_fault=True), Held(has_interlock_fault=True)),
+        (status(AcuMode.STANDBY, backup_selected=Backup.RATE), Held()),
+        (status(AcuMode.REMOTE_BACKUP), Held()),
+        (status(AcuMode.STANDBY, is_remote_enabled=False), Held()),
+        (status(AcuMode.STANDBY), None),
+    ],
+    ids=["register watchdog", "again", "power cycle", "still ours", "local panel", "clean stop before"],
+)
+def test_p4_after_a_crash_it_goes_on_where_the_acu_shows_its_own_doing(seen: Status, held: Held | None) -> None:
+    assert started_again(seen, held)[0].is_armed(GUARDED)
+
+
+def test_p1_a_stow_while_the_daemon_was_dead_is_kept() -> None:
+    seen = status(AcuMode.STOWED, is_autotrack_selected=False)
+    assert started_again(seen)[0].track is TrackState.STOW
+    assert started_again(seen, None)[0].track is TrackState.IDLE
+
+
+def test_a_person_who_arms_before_the_acu_answers_is_believed() -> None:
+    state, _ = started_again(status(AcuMode.STANDBY), requests=(Request.ARM,))
+    assert state.is_armed(GUARDED)
+    lost = replace(moving(), track=TrackState.LINK_LOST, stage=Stage.NEW, in_force=(NOW - 2.0, 100.0, 40.0))
+    lost, _ = tick(lost, Observation(silence_s=2.0, requests=(Request.ARM,)), FITTED, NOW, GUARDED)
+    assert run(lost, status(AcuMode.STANDBY))[0].is_armed(GUARDED)
 
 
 def test_an_acu_found_autotracking_far_from_the_path_is_not_believed() -> None:

@@ -1,7 +1,6 @@
 """P6, P10: the latch stands in a file of its own, and a file that is there latches, whatever else is lost."""
 
 import errno
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,9 +8,8 @@ from structlog.testing import capture_logs
 from test_run_state import written
 
 import acu_daemon.edge.latch as latch_file
-from acu_daemon.control.state import ControlState
 from acu_daemon.edge.clock import LoopClock
-from acu_daemon.edge.latch import LATCH, LatchKeeper, read_latch
+from acu_daemon.edge.latch import DISARMED, LATCH, LatchKeeper, read_latch
 from acu_daemon.edge.run_state import read_run_state
 from acu_daemon.edge.writer import Writer
 
@@ -28,12 +26,12 @@ class NoonClock(LoopClock):
         return 32.0
 
 
-def see(directory: Path, *latches: str) -> None:
+def see(directory: Path, *latches: str, name: str = LATCH) -> None:
     """Ticks of a daemon that begins with what stands there."""
     writer = Writer("files")
-    keeper = LatchKeeper(directory, writer, read_latch(directory), NoonClock())
+    keeper = LatchKeeper(directory, writer, read_latch(directory, name), NoonClock(), name)
     for latch in latches:
-        keeper.see(replace(ControlState(), latch=latch))
+        keeper.see(latch)
         while writer.waiting_count or keeper._latest._is_waiting:
             pass
     assert writer.close(60.0)
@@ -50,12 +48,25 @@ def test_p6_a_latch_is_a_readable_file_and_gone_when_it_is_cleared(tmp_path: Pat
     assert read_latch(tmp_path) == ""
 
 
+@pytest.mark.parametrize("name", [LATCH, DISARMED])
 @pytest.mark.parametrize("damage", [b"", b"{", b"\0" * 4096])
-def test_p6_the_latch_outlives_a_run_state_that_is_torn_or_gone(tmp_path: Path, damage: bytes) -> None:
-    see(tmp_path, TEXT)
+def test_p1_p6_a_latch_and_a_disarm_outlive_a_run_state_that_is_torn_or_gone(
+    tmp_path: Path, damage: bytes, name: str
+) -> None:
+    see(tmp_path, TEXT, name=name)
     written(tmp_path).write_bytes(damage)
     assert read_run_state(tmp_path).fit is None
-    assert read_latch(tmp_path) == TEXT
+    assert read_latch(tmp_path, name) == TEXT
+
+
+def test_p1_a_file_of_a_disarm_that_cannot_be_read_disarms_and_says_what_to_do(tmp_path: Path) -> None:
+    (tmp_path / DISARMED).touch()
+    with capture_logs() as logs:
+        text = read_latch(tmp_path, DISARMED)
+    assert [(log["event"], log["log_level"]) for log in logs] == [("disarmed.unreadable", "error")]
+    assert "acu-daemon arm" in text
+    see(tmp_path, text, "", name=DISARMED)
+    assert not (tmp_path / DISARMED).exists()
 
 
 @pytest.mark.parametrize("data", [b"", b"\n\n", b"a line", b"\xff\n\n", b"\0" * 50, b"a\n" * 9, b"x" * 5000, None])
@@ -89,14 +100,13 @@ def test_p6_what_could_not_be_written_is_written_at_a_later_tick(tmp_path: Path)
     directory = tmp_path / "gone"
     writer = Writer("files")
     keeper = LatchKeeper(directory, writer, "", NoonClock())
-    state = replace(ControlState(), latch=TEXT)
     with capture_logs() as logs:
         for _ in range(3):
-            keeper.see(state)
+            keeper.see(TEXT)
             while writer.waiting_count or keeper._latest._is_waiting:
                 pass
         writer.put(directory.mkdir)
-        keeper.see(state)
+        keeper.see(TEXT)
         assert writer.close(60.0)
     assert [log["event"] for log in logs] == ["latch.not_saved", "latch.saved_again"]
     assert read_latch(directory) == TEXT

@@ -11,20 +11,21 @@ import pytest
 from structlog.testing import capture_logs
 from test_carry_over_file import CARRIED, FIT
 
-from acu_daemon.control.state import ControlState
+from acu_daemon.control.state import ControlState, Held
 from acu_daemon.control.states import TrackState
 from acu_daemon.edge.run_state import RUN_STATE, RunState, RunStateKeeper, read_run_state
 from acu_daemon.edge.writer import Writer
 from acu_daemon.model import Pass
 
-STATE = RunState("ISS (25544)", 1000.0, 1600.0, None, "HOLD/FITTED", False, CARRIED)
+STATE = RunState("ISS (25544)", 1000.0, 1600.0, None, "HOLD/FITTED", True, held=False, fit=CARRIED)
 COMING = Pass(1000.2, 1300.0, 1600.1, 10.0, 60.0, 90.0, 170.0)
 
 
 def written(directory: Path, state: RunState = STATE) -> Path:
     writer = Writer("files")
     keeper = RunStateKeeper(directory, writer, replace(state, track=""), lambda _: None)
-    keeper.see(replace(ControlState(), track=TrackState(state.track), arming=state.arming))
+    held = None if state.held is None else Held(state.held)
+    keeper.see(replace(ControlState(), track=TrackState(state.track), arming=state.arming, held=held))
     assert writer.close(60.0)
     return directory / RUN_STATE
 
@@ -72,11 +73,22 @@ def test_p10_every_cut_of_a_file_is_an_alarm(tmp_path: Path) -> None:
         assert alarm(tmp_path)
 
 
+def test_p4_a_file_of_an_older_version_that_holds_nothing_of_the_antenna_is_read(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    old = json.loads(path.read_text())
+    del old["held"], old["is_stow_kept"]
+    path.write_text(json.dumps(old))
+    read = read_run_state(tmp_path)
+    assert (read.track, read.held, read.is_stow_kept) == ("HOLD/FITTED", None, False)
+
+
 @pytest.mark.parametrize(
     ("key", "value"),
     [
         ("version", 2),
         ("arming", "yes"),
+        ("held", 0),
+        ("is_stow_kept", "no"),
         ("satellite", 7),
         ("rise_tai_s", "soon"),
         ("set_tai_s", float("nan")),
@@ -115,18 +127,18 @@ def test_another_rehearsal_of_the_pass_is_not_gone_on_with(clock_s: float | None
 def test_a_change_is_written_and_a_tick_without_one_is_not(tmp_path: Path) -> None:
     writer = Writer("files")
     keeper = RunStateKeeper(tmp_path, writer, STATE, lambda fit: replace(CARRIED, at_tai_s=fit.at_tai_s))
-    state = replace(ControlState(), track=TrackState.HOLD_FITTED, arming=False)
+    state = replace(ControlState(), track=TrackState.HOLD_FITTED, arming=True, held=Held())
     for _ in range(10):
         keeper.see(state)
-    while writer.waiting_count:
+    while writer.waiting_count or keeper._latest._is_waiting:
         pass
     assert not (tmp_path / RUN_STATE).exists()
     keeper.offer(replace(FIT, at_tai_s=5.0))
-    keeper.see(replace(state, arming=True))
+    keeper.see(replace(state, arming=False))
     assert writer.close(60.0)
     read = read_run_state(tmp_path)
     assert read.fit is not None
-    assert (read.arming, read.fit.at_tai_s) == (True, 5.0)
+    assert (read.arming, read.fit.at_tai_s) == (False, 5.0)
 
 
 def test_p10_a_full_disk_is_told_at_its_edges(tmp_path: Path) -> None:

@@ -11,10 +11,10 @@ from acu_daemon.assist.carry_over import CarryOver, carry_over_of, resume_of, wh
 from acu_daemon.assist.estimator import has_covariance
 from acu_daemon.cli.options import Target
 from acu_daemon.config import estimator_settings
-from acu_daemon.control.state import ControlState
+from acu_daemon.control.state import ControlState, Held
 from acu_daemon.edge.carry_over import FitKeeper, carry_over_path, read_carry_over
 from acu_daemon.edge.clock import SystemClock
-from acu_daemon.edge.latch import LatchKeeper, read_latch
+from acu_daemon.edge.latch import DISARMED, LatchKeeper, read_latch
 from acu_daemon.edge.run_state import RunState, RunStateKeeper, read_run_state
 from acu_daemon.edge.writer import Writer
 from acu_daemon.model import FitResult, Pass
@@ -22,18 +22,19 @@ from acu_daemon.model import FitResult, Pass
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """What was left, and the three that keep what this run leaves.
+    """What was left, and the four that keep what this run leaves.
 
     carried: the fit of this pass, where the daemon is started again in it, else what the last pass left.
-    arming: as a person left it in this pass; None: as configured.  latch: until a person clears it, whatever the pass.
+    state: what the decision begins with.  A latch and a disarm stay until a person ends them, whatever the pass; what a
+    person armed is armed for one pass.
     """
 
     carried: CarryOver | None
-    arming: bool | None
-    latch: str
+    state: ControlState
     carry_over: FitKeeper
     run_state: RunStateKeeper
     latches: LatchKeeper
+    disarms: LatchKeeper
 
     def offer(self, fit: FitResult) -> None:
         """Take an accepted fit."""
@@ -42,7 +43,8 @@ class Kept:
 
     def see(self, state: ControlState) -> None:
         """Take the memory of a tick."""
-        self.latches.see(state)
+        self.latches.see(state.latch)
+        self.disarms.see(state.disarmed_by)
         self.run_state.see(state)
 
     def flush(self) -> None:
@@ -54,8 +56,9 @@ def open_kept(directory: Path, target: Target, coming: Pass, clock: SystemClock,
     """Read what was left; say in the log what of it is used."""
     source, site, now_tai_s = target.elements.propagator, target.station.site, clock.tai_s()
     clock_s = now_tai_s - clock.monotonic_s() if clock.is_rehearsal else None
-    left, latch = read_run_state(directory), read_latch(directory)
+    left, latch, disarmed_by = read_run_state(directory), read_latch(directory), read_latch(directory, DISARMED)
     is_same_pass = left.is_of(target.elements.label, coming, clock_s)
+    state = _first_state(left if is_same_pass else RunState(), latch, disarmed_by)
     resumed = _resumed(left, target, now_tai_s) if is_same_pass else None
     path = carry_over_path(directory, target.satellite.satellite.norad_id, target.satellite.satellite.name)
     first = RunState(
@@ -63,16 +66,29 @@ def open_kept(directory: Path, target: Target, coming: Pass, clock: SystemClock,
         rise_tai_s=coming.rise_tai_s,
         set_tai_s=coming.set_tai_s,
         clock_s=clock_s,
-        arming=left.arming if is_same_pass else None,
+        arming=state.arming,
         fit=resumed,
     )
     return Kept(
         carried=resumed or _carried(target, path, now_tai_s),
-        arming=first.arming,
-        latch=latch,
+        state=state,
         carry_over=FitKeeper(path, target.elements.label, partial(carry_over_of, source=source, site=site), files),
         run_state=RunStateKeeper(directory, files, first, partial(resume_of, source=source, site=site)),
         latches=LatchKeeper(directory, files, latch, clock),
+        disarms=LatchKeeper(directory, files, disarmed_by, clock, DISARMED),
+    )
+
+
+def _first_state(left: RunState, latch: str, disarmed_by: str) -> ControlState:
+    """What the decision begins with; left: of this pass."""
+    is_disarmed = bool(disarmed_by) or left.arming is False
+    return ControlState(
+        arming=False if is_disarmed else left.arming,
+        disarmed_by=disarmed_by or ("a person, before the restart" if is_disarmed else ""),
+        latch=latch,
+        is_stop_due=bool(latch) and not is_disarmed,
+        held=None if left.held is None else Held(left.held),
+        is_stow_kept=left.is_stow_kept,
     )
 
 

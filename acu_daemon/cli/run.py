@@ -130,7 +130,7 @@ def command(
         ends.callback(kept.flush)
         job = make_job(target, coming, link, is_rehearsal=clock.is_rehearsal, end_tai_s=end_tai_s, carried=kept.carried)
         job = replace(job, control=replace(job.control, is_shadow=shadow))
-        job = replace(job, arming=kept.arming, latch=kept.latch)
+        job = replace(job, state=kept.state)
         outcome = asyncio.run(_run(job, link, clock, live, recording, files, kept, directory))
         structlog.get_logger("run").info("run.done", **asdict(outcome))
     if not outcome.is_stopped:

@@ -104,7 +104,8 @@ def _watchdog_after(state: ControlState, status: Status) -> Watchdog:
 def _is_stow_kept(state: ControlState, status: Status) -> bool:
     """A stow that began after the start is somebody's wish; an antenna found stowed at the start is ours to take."""
     if status.mode is AcuMode.STOWED:
-        return state.is_stow_kept or (state.status is not None and state.status.mode is not AcuMode.STOWED)
+        was_elsewhere = state.status is not None and state.status.mode is not AcuMode.STOWED
+        return state.is_stow_kept or was_elsewhere or state.held is not None
     return status.mode is AcuMode.STOWING
 
 

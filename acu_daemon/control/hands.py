@@ -6,17 +6,17 @@ the emergency stop and an open door.  The latch stays until a person clears it, 
 
 from collections.abc import Iterable
 from dataclasses import replace
+from math import inf
 
 from acu_daemon.control.axis_watch import AxesWatch, AxisSeen, duty_of, sky_scale, watch_axes
 from acu_daemon.control.start import WATCHDOG
-from acu_daemon.control.state import ControlConfig, ControlState, Event, Observation, Request, Stage, Watchdog
+from acu_daemon.control.state import ControlConfig, ControlState, Event, Held, Observation, Request, Stage, Watchdog
 from acu_daemon.control.states import ACTIVE, TrackState
 from acu_daemon.protocol.messages import AcuMode, Backup, Command, Faults, ReadFaults, Status, Stop, WriteParameter
 from acu_daemon.units import wrap_180
 
 NO_STOP_MODES = (AcuMode.MANUAL, AcuMode.STOWING, AcuMode.STOWED, AcuMode.FAULT)  # a stop would disturb, or do nothing
 STOPPED_FROM = (AcuMode.REMOTE, AcuMode.ACQUIRE, AcuMode.AUTOTRACK, AcuMode.REMOTE_BACKUP)
-UNSERVED_S = 0.5  # registers unwritten for so long: STANDBY may be the work of the ACU's own watchdog
 RATE_SPAN_S = 1.0
 EMERGENCY_STOP, DOOR_OPEN = 1, 2  # of the interlock nibble, ICD section 4
 
@@ -28,10 +28,12 @@ def obey(state: ControlState, requests: Iterable[Request], config: ControlConfig
             events.append(Event("latch.cleared", {"latch": state.latch}))
             is_stop_due = state.is_stop_due and not state.is_armed(config)
             state = replace(_anew(state), latch="", is_stop_due=is_stop_due)
-        elif request is Request.ARM and not config.is_shadow and not state.is_armed(config):
-            events.append(Event("armed"))
-            is_stop_due = state.is_stop_due and bool(state.latch)
-            state = replace(_anew(state), arming=True, disarmed_by="", is_stop_due=is_stop_due)
+        elif request is Request.ARM and not config.is_shadow:
+            state = replace(state, held=None)  # whoever says so has seen how the antenna stands
+            if not state.is_armed(config):
+                events.append(Event("armed"))
+                is_stop_due = state.is_stop_due and bool(state.latch)
+                state = replace(_anew(state), arming=True, disarmed_by="", is_stop_due=is_stop_due)
         elif request is Request.DISARM and state.is_armed(config):
             state = _disarm(state, "a person", events)
             state = replace(state, is_stop_due=state.is_stop_due or state.in_force is not None)
@@ -59,21 +61,35 @@ def _disarm(state: ControlState, by: str, events: list[Event]) -> ControlState:
 
 
 def respect_stop(before: ControlState, state: ControlState, config: ControlConfig, events: list[Event]) -> ControlState:
-    """Take STANDBY out of a tracking mode for a STOP by another hand, unless it looks like a power cycle or a fault.
+    """Take STANDBY where the daemon held the antenna for a STOP by another hand, unless the ACU did it itself.
 
-    Signs of a power cycle: the backup is forgotten.  Of a fault or the register watchdog: a new fault bit, or registers
-    that went unwritten for a while.  before: the memory one tick ago.
+    Held before a lost link, a hang or a crash counts as well.  Sign of a power cycle: the backup is forgotten.  Of the
+    register watchdog: its fault bit.  That stays until it is reset; where it stood already, time must tell.
+    before: the memory one tick ago.
     """
-    was, now = before.status, state.status
-    if was is None or now is None or before.in_force is None or state.reading is None:
+    now, held = state.status, state.held
+    if now is before.status or now is None or state.reading is None or held is None:
         return state
-    is_ours = state.is_armed(config) and not state.latch and state.stage is Stage.READY and state.track in ACTIVE
-    is_stopped = was.mode in STOPPED_FROM and now.mode is AcuMode.STANDBY and now.backup_selected is Backup.REMOTE
+    is_stopped = now.mode is AcuMode.STANDBY and now.backup_selected is Backup.REMOTE
     is_stopped = is_stopped and now.is_remote_enabled  # else it is the local panel's, and ends with it
-    is_served = state.reading.tai_s - before.in_force[0] < UNSERVED_S
-    if is_ours and is_stopped and is_served and _faults(now) == _faults(was):
+    unwritten_s = inf if before.in_force is None else state.reading.tai_s - before.in_force[0]
+    is_new_fault = now.has_interlock_fault and not held.has_interlock_fault
+    may_be_watchdog = now.has_interlock_fault and 0.0 < config.register_watchdog_s <= unwritten_s
+    if is_stopped and not is_new_fault and not may_be_watchdog and state.is_armed(config) and not state.latch:
         return _disarm(state, "another hand that stopped the antenna", events)
     return state
+
+
+def note_held(state: ControlState, config: ControlConfig) -> ControlState:
+    """Remember that the daemon holds the antenna, through lost links and new starts until the ACU says otherwise."""
+    status = state.status
+    if not state.is_armed(config) or state.latch:
+        return replace(state, held=None)
+    if status is None or state.track is TrackState.LINK_LOST:
+        return state
+    is_held = state.track in ACTIVE if state.stage is Stage.READY else state.held is not None
+    has_fault = status.has_interlock_fault
+    return replace(state, held=Held(has_fault) if is_held and status.mode in STOPPED_FROM else None)
 
 
 def respect_interlock(

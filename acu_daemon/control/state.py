@@ -77,6 +77,13 @@ class Sent:
 
 
 @dataclass(frozen=True, slots=True)
+class Held:
+    """The antenna as the daemon had it last, in a mode that follows it or autotracks."""
+
+    has_interlock_fault: bool = False  # n5.b3: the bit with which the ACU's register watchdog shows
+
+
+@dataclass(frozen=True, slots=True)
 class ControlState:
     """The memory of the 10 Hz decision."""
 
@@ -116,6 +123,7 @@ class ControlState:
     faults_read: tuple[bool, ...] | None = None  # the fault bits of the status whose detail was read, while in FAULT
     is_stop_due: bool = False  # STOP is sent until it is acknowledged
     in_force: tuple[float, float, float] | None = None  # the last accepted write: time, continuous azimuth, elevation
+    held: Held | None = None  # None: it does not hold the antenna; kept through lost links and restarts
     watchdog: Watchdog = Watchdog.UNKNOWN
     watchdog_try_count: int = 0
     axes: AxesWatch = AxesWatch()

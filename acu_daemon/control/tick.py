@@ -15,6 +15,7 @@ from acu_daemon.control.gate import Passed, gate
 from acu_daemon.control.hands import (
     last_command,
     let_be,
+    note_held,
     obey,
     question,
     respect_interlock,
@@ -58,7 +59,7 @@ def tick(
     state = respect_stop(before, state, config, events)
     state = respect_interlock(state, seen, config, events)
     state = let_be(watch_antenna(state, seen, config, events))
-    state = _walk(state, seen, sky, now_tai_s, config, events)
+    state = note_held(_walk(state, seen, sky, now_tai_s, config, events), config)
     is_write_owed = before.stage is Stage.READY and bool(before.commands) and before.commands[-1] is None
     state, orders = _order(state, seen, sky, now_tai_s, config, events, is_write_owed=is_write_owed)
     return fence(state, orders, config)

@@ -3,7 +3,7 @@
 import asyncio
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import structlog
@@ -41,8 +41,7 @@ class PassJob:
     device_delay_s: float
     is_rehearsal: bool = False
     end_tai_s: float = math.inf  # of --duration
-    arming: bool | None = None  # as the last run was left, when it was cut off; None: as configured
-    latch: str = ""
+    state: ControlState = ControlState()  # what the decision begins with: what the last run left
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,11 +92,7 @@ class Service:
         self._ticked = asyncio.Event()
         self._stop_reason = ""
         self._log: Any = structlog.get_logger("pass")
-        self._area = CommonArea(
-            state=ControlState(
-                arming=job.arming, latch=job.latch, is_stop_due=bool(job.latch) and job.arming is not False
-            )
-        )
+        self._area = CommonArea(state=job.state)
         self._port = AcuPort(link, clock, job.address, job.control.period_s, job.device_delay_s)
         self._background = Background(
             self._area,
@@ -132,6 +127,7 @@ class Service:
                     reason = await self._track()
                 finally:
                     is_stopped = await self._safe_stop()
+                    self._leave(is_stopped=is_stopped)
                     link.cancel()
                     await self._runner.close()
         except ExceptionGroup as group:
@@ -204,6 +200,11 @@ class Service:
         except TimeoutError:
             self._log.error("stop.timeout", advice="the antenna may still follow its registers: look at the ACU")
             return False
+
+    def _leave(self, *, is_stopped: bool) -> None:
+        """Whoever starts next must not take our stop for another hand's."""
+        if is_stopped and self._on_state is not None:
+            self._on_state(replace(self._area.state, held=None))
 
     def _after_tick(self) -> None:
         self._background.wake()

@@ -1,6 +1,6 @@
-"""The latch of an axis in the state directory: a file of its own, there as long as nothing may move.
+"""What forbids to move, in the state directory: `latch`, of an axis, and `disarmed`, each a file of its own.
 
-Its existence is the latch, whatever it holds: the text, and the UTC since when, each in a line.
+Its existence forbids, whatever it holds and whatever the pass: the text, and the UTC since when, each in a line.
 """
 
 import contextlib
@@ -9,19 +9,21 @@ from typing import Any
 
 import structlog
 
-from acu_daemon.control.state import ControlState
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.writer import Latest, Writer, remove_file, replace_file
 from acu_daemon.orbit.timescales import utc_text
 
-LATCH = "latch"
-ADVICE = "look at the antenna, then `acu-daemon clear`"
+LATCH, DISARMED = "latch", "disarmed"
+ADVICE = {
+    LATCH: "look at the antenna, then `acu-daemon clear`",
+    DISARMED: "look at the antenna, then `acu-daemon arm`",
+}
 _LARGEST_BYTES = 1000
 
 
-def read_latch(directory: Path) -> str:
-    """What is latched; "" where there is no file.  One that cannot be read latches too, and its text says so."""
-    path = directory / LATCH
+def read_latch(directory: Path, name: str = LATCH) -> str:
+    """What is latched, or disarmed by; "" where there is no file.  One that cannot be read counts too, and says so."""
+    path, advice = directory / name, ADVICE[name]
     log: Any = structlog.get_logger("latch")
     try:
         with path.open("rb") as file:
@@ -31,51 +33,52 @@ def read_latch(directory: Path) -> str:
     except FileNotFoundError:
         return ""
     except (OSError, ValueError) as error:
-        log.error("latch.unreadable", file=str(path), reason=str(error), action="latched", advice=ADVICE)
-        return f"the file {LATCH} in the state directory cannot be read: {ADVICE}"
-    log.warning("latch.kept", latch=text, since=since, advice=ADVICE)
+        log.error(f"{name}.unreadable", file=str(path), reason=str(error), action="it counts", advice=advice)
+        return f"the file {name} in the state directory, which cannot be read: {advice}"
+    log.warning(f"{name}.kept", **{name: text}, since=since, advice=advice)
     return text
 
 
 class LatchKeeper:
-    """Writes and removes the file.  The loop never waits for the disk; what fails is tried again at the next tick."""
+    """Writes and removes a file.  The loop never waits for the disk; what fails is tried again at the next tick."""
 
-    def __init__(self, directory: Path, writer: Writer, first: str, clock: Clock) -> None:
-        self._path = directory / LATCH
+    def __init__(self, directory: Path, writer: Writer, first: str, clock: Clock, name: str = LATCH) -> None:
+        self._name = name
+        self._path = directory / name
         self._clock = clock
         self._wanted = self._saved = first
         self._latest: Latest[str] = Latest(writer, self._save)
         self._has_failed = False
 
-    def see(self, state: ControlState) -> None:
-        """Take the memory of a tick."""
-        if state.latch != self._wanted or state.latch != self._saved:
-            self._wanted = state.latch
-            self._latest.offer(state.latch)
+    def see(self, text: str) -> None:
+        """Take what a tick says; "": nothing."""
+        if text != self._wanted or text != self._saved:
+            self._wanted = text
+            self._latest.offer(text)
 
-    def _save(self, latch: str) -> None:
-        if latch == self._saved:
+    def _save(self, text: str) -> None:
+        if text == self._saved:
             return
         log: Any = structlog.get_logger("latch")
         try:
-            self._put(latch)
+            self._put(text)
         except OSError as error:
             if not self._has_failed:
-                log.error("latch.not_saved", file=str(self._path), latch=latch, reason=str(error))
+                log.error(f"{self._name}.not_saved", file=str(self._path), text=text, reason=str(error))
             self._has_failed = True
             return
-        self._saved = latch
+        self._saved = text
         if self._has_failed:
-            log.info("latch.saved_again", file=str(self._path))
+            log.info(f"{self._name}.saved_again", file=str(self._path))
             self._has_failed = False
 
-    def _put(self, latch: str) -> None:
-        if not latch:
+    def _put(self, text: str) -> None:
+        if not text:
             remove_file(self._path)
             return
         try:
-            replace_file(self._path, f"{latch}\n{utc_text(self._clock.tai_s())}\n".encode())
+            replace_file(self._path, f"{text}\n{utc_text(self._clock.tai_s())}\n".encode())
         except OSError:
             with contextlib.suppress(OSError):
-                self._path.touch()  # an empty file needs no room on a full disk, and latches as well
+                self._path.touch()  # an empty file needs no room on a full disk, and counts as well
             raise

@@ -1,6 +1,7 @@
 """What a restart needs (run.json in the state directory): the pass in progress, its newest fit, arming.
 
-Written whole, beside the loop, at every accepted fit and whenever state or arming change.  The latch has its own file.
+Written whole, beside the loop, at every accepted fit and whenever state or arming change.  A latch and a disarm have
+files of their own.
 """
 
 import contextlib
@@ -37,6 +38,8 @@ class RunState:
     clock_s: float | None = None
     track: str = ""
     arming: bool | None = None  # as a person left it; None: as configured
+    held: bool | None = None  # the daemon held the antenna, with this fault bit; None: it did not
+    is_stow_kept: bool = False
     fit: CarryOver | None = None
 
     def is_of(self, satellite: str, coming: Pass, clock_s: float | None) -> bool:
@@ -92,7 +95,10 @@ class RunStateKeeper:
 
     def see(self, state: ControlState) -> None:
         """Take the memory of a tick; it is written where it differs."""
-        seen = replace(self._state, track=str(state.track), arming=state.arming)
+        held = None if state.held is None else state.held.has_interlock_fault
+        seen = replace(
+            self._state, track=str(state.track), arming=state.arming, held=held, is_stow_kept=state.is_stow_kept
+        )
         if seen != self._state:
             self._state = seen
             self._latest.offer((seen, self._fit))
@@ -123,6 +129,8 @@ def _to_json(state: RunState) -> dict[str, Any]:
         "clock_s": state.clock_s,
         "state": state.track,
         "arming": state.arming,
+        "held": state.held,
+        "is_stow_kept": state.is_stow_kept,
         "fit": None if state.fit is None else to_json(state.satellite, state.fit),
     }
 
@@ -131,9 +139,7 @@ def _from_json(read: Any) -> RunState:
     """Raises: ValueError, TypeError, KeyError: what is wrong."""
     if not isinstance(read, dict) or read.get("version") != VERSION:
         raise ValueError(f"expected a JSON object with version {VERSION}")
-    arming, clock_s = read["arming"], read["clock_s"]
-    if not (arming is None or isinstance(arming, bool)):
-        raise ValueError(f"arming = {arming!r}: expected true, false or null")
+    clock_s = read["clock_s"]
     satellite = _text(read["satellite"])
     return RunState(
         satellite=satellite,
@@ -141,9 +147,18 @@ def _from_json(read: Any) -> RunState:
         set_tai_s=number(read["set_tai_s"]),
         clock_s=None if clock_s is None else number(clock_s),
         track=_text(read["state"]),
-        arming=arming,
+        arming=_flag(read, "arming"),
+        held=_flag(read, "held"),
+        is_stow_kept=bool(_flag(read, "is_stow_kept")),
         fit=None if read["fit"] is None else replace(from_json(read["fit"], satellite), is_of_this_pass=True),
     )
+
+
+def _flag(read: dict[str, Any], name: str) -> bool | None:
+    value = read.get(name)
+    if not (value is None or isinstance(value, bool)):
+        raise ValueError(f"{name} = {value!r}: expected true, false or null")
+    return value
 
 
 def _text(value: Any) -> str:
