@@ -410,13 +410,16 @@ def test_a_rehearsal_refuses_a_real_acu_before_anything_is_written() -> None:
     assert not any(isinstance(command, Stop) for command in Real.heard)
 
 
+@pytest.mark.parametrize("at_s", [15.03, 15.005], ids=["between two exchanges", "within one"])
 @pytest.mark.parametrize("losses", [[], [(12.0, 30.0)]], ids=["tracking", "lost"])
-def test_a_stop_in_mid_pass_leaves_the_acu_in_standby(losses: list[tuple[float, float]]) -> None:
-    flight = climb(30.0, losses=losses, script=[(15.03, lambda stage: stage.service.stop("SIGTERM"))])
+def test_a_stop_in_mid_pass_leaves_the_acu_in_standby(losses: list[tuple[float, float]], at_s: float) -> None:
+    """The exchange that is going on ends first: one command is outstanding at most (ICD section 1)."""
+    flight = climb(30.0, losses=losses, script=[(at_s, lambda stage: stage.service.stop("SIGTERM"))])
     assert flight.outcome is not None
     assert flight.outcome.reason == "SIGTERM"
     assert flight.outcome.is_stopped
     assert [command for _, command in flight.commands[-2:]] == [Stop(), WriteParameter("W", 0)]
+    assert isinstance(flight.commands[-3][1], WriteAndPoll)
     assert flight.rows[-1].mode is AcuMode.STANDBY or flight.commands[-1][0] < T + 15.2
 
 

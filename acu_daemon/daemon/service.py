@@ -110,9 +110,8 @@ class Service:
         self._hands = Hands(self._area, job.control, self._foreground.ask, self.snapshot)
 
     def stop(self, reason: str) -> None:
-        """End the run at the next tick, safe stop included."""
+        """End the run after the present tick, or the next one: no exchange is cut off.  Safe stop included."""
         self._stop_reason = self._stop_reason or reason
-        self._ticked.set()
 
     async def run(self) -> Outcome:
         """Run the pass.
