@@ -210,15 +210,23 @@ def test_a_pass_without_a_fit_writes_nothing(path: Path, monkeypatch: pytest.Mon
     assert disk.times == []
 
 
-def test_p10_a_full_disk_is_told_once_and_stops_nothing(
+def test_p10_a_full_disk_is_told_at_its_edges_and_the_newest_fit_is_saved_once_there_is_room(
     path: Path, monkeypatch: pytest.MonkeyPatch, writer: Writer
 ) -> None:
     disk, kept = Disk(monkeypatch), keeper(path, writer)
     disk.error = OSError(28, "No space left on device")
     with capture_logs() as told:
-        for period in range(3):
-            kept.offer(replace(FIT, at_tai_s=20.0 * period))
-            while disk.failed_count <= period:
+        for second in range(3):
+            kept.offer(replace(FIT, at_tai_s=float(second)))
+            while disk.failed_count <= second:
                 time.sleep(0.001)
+        while kept.problem != f"{path.name}: No space left on device":
+            time.sleep(0.001)
+        disk.error = None
+        kept.flush()
         assert writer.close()
-    assert [(one["event"], one["file"]) for one in told] == [("carry_over.not_saved", str(path))]
+    assert [(one["event"], one["file"]) for one in told] == [
+        ("carry_over.not_saved", str(path)),
+        ("carry_over.saved_again", str(path)),
+    ]
+    assert (disk.times, kept.problem) == ([2.0], "")

@@ -96,6 +96,18 @@ def test_p6_p10_on_a_full_disk_an_empty_file_latches_and_the_text_follows_when_t
     assert "cannot be read" in read_latch(tmp_path)
 
 
+def test_p6_p10_what_was_latched_on_a_full_disk_can_be_cleared_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path, data: bytes) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(latch_file, "replace_file", full)
+    see(tmp_path, TEXT, TEXT, "")
+    assert list(tmp_path.iterdir()) == []
+    assert read_latch(tmp_path) == ""
+
+
 def test_p6_what_could_not_be_written_is_written_at_a_later_tick(tmp_path: Path) -> None:
     directory = tmp_path / "gone"
     writer = Writer("files")

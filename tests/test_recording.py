@@ -1,6 +1,7 @@
 """Recorded readings: what is written can be read, and every bad line is told by its number."""
 
 import resource
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -91,8 +92,10 @@ def seconds_in(path: Path) -> list[float]:
 
 
 def test_p10_a_full_disk_is_told_once_and_stops_nothing() -> None:
-    with capture_logs() as logs:
-        record(Path("/dev/full"), *range(100, 120))
+    with capture_logs() as logs, RecordingWriter(Path("/dev/full")) as recording:
+        for second in range(100, 120):
+            recording.add(Reading(second, 1.0, 2.0, True))
+        assert recording.problem == "full: No space left on device"
     assert [log["event"] for log in logs] == ["record.failed"]
 
 
@@ -114,6 +117,7 @@ def test_p10_a_recording_goes_on_with_whole_lines_when_there_is_space_again(
             recording.add(Reading(100.0 + tick, 1.0, 2.0, True))
             if tick == 5500:
                 full_at(-1)
+        assert recording.problem == ""
     full_at(-1)
     assert path.read_bytes().endswith(b"\n")
     seconds = seconds_in(path)
@@ -189,6 +193,19 @@ def test_beside_the_loop_every_line_is_in_the_file_once_the_writer_has_ended(tmp
     record(path, *range(100, 200), writer=writer)
     assert writer.close(60.0)
     assert seconds_in(path) == list(range(100, 200))
+
+
+def test_p10_a_disk_that_does_not_keep_up_is_told_once(tmp_path: Path) -> None:
+    path, writer, go = tmp_path / "x.csv", Writer("files", limit=5), threading.Event()
+    writer.put(go.wait)
+    with capture_logs() as logs, RecordingWriter(path, writer) as recording:
+        for second in range(100, 120):
+            recording.add(Reading(second, 1.0, 2.0, True))
+        assert recording.problem == "x.csv: the disk does not keep up"
+        go.set()
+    assert writer.close(60.0)
+    assert logs[0]["event"] == "record.failed"
+    assert seconds_in(path)[0] == 100.0
 
 
 def test_a_recording_that_cannot_be_made_is_wrong_use(tmp_path: Path) -> None:

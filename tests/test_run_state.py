@@ -13,7 +13,7 @@ from test_carry_over_file import CARRIED, FIT
 
 from acu_daemon.control.state import ControlState, Held
 from acu_daemon.control.states import TrackState
-from acu_daemon.edge.run_state import RUN_STATE, RunState, RunStateKeeper, read_run_state
+from acu_daemon.edge.run_state import RETRY_TICKS, RUN_STATE, RunState, RunStateKeeper, read_run_state
 from acu_daemon.edge.writer import Writer
 from acu_daemon.model import Pass
 
@@ -160,3 +160,28 @@ def test_p10_a_full_disk_is_told_at_its_edges(tmp_path: Path) -> None:
         assert writer.close(60.0)
     assert [log["event"] for log in logs] == ["run_state.not_saved", "run_state.saved_again"]
     assert read_run_state(gone).track == "HOLD/FITTED"
+
+
+def test_p10_what_a_full_disk_refused_is_written_again_though_nothing_changes(tmp_path: Path) -> None:
+    writer, gone = Writer("files"), tmp_path / "gone"
+    keeper = RunStateKeeper(gone, writer, STATE, lambda _: None)
+    state = replace(ControlState(), track=TrackState.HOLD_FITTED, arming=True)
+
+    def ticks(count: int) -> None:
+        for _ in range(count):
+            keeper.see(state)
+            while keeper._latest._is_waiting or writer.waiting_count:
+                pass
+
+    with capture_logs() as logs:
+        ticks(1)
+        while not keeper.problem:
+            pass
+        assert keeper.problem == "run.json: No such file or directory"
+        ticks(RETRY_TICKS)
+        gone.mkdir()
+        ticks(RETRY_TICKS)
+        assert writer.close(60.0)
+    assert [log["event"] for log in logs] == ["run_state.not_saved", "run_state.saved_again"]
+    assert read_run_state(gone).arming is True
+    assert keeper.problem == ""

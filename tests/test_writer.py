@@ -11,6 +11,7 @@ import pytest
 import structlog
 from structlog.testing import capture_logs
 
+import acu_daemon.edge.writer as edge
 from acu_daemon.edge.logs import configure_logs, tell_dropped
 from acu_daemon.edge.writer import LIVE_LIMIT, Latest, QueuedStream, Writer, replace_file
 
@@ -71,6 +72,17 @@ def test_a_stuck_writer_holds_nobody_up_for_longer_than_it_is_given() -> None:
     assert not writer.put(lambda: None)
     job.go.set()
     assert writer.close(PATIENT_S)
+
+
+def test_p10_a_disk_that_does_not_answer_is_told_while_it_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(edge, "STUCK_S", -1.0)
+    writer = Writer("test")
+    assert writer.problem == ""
+    job = stuck(writer)
+    assert writer.problem == "the disk has not answered for 0 s"
+    job.go.set()
+    assert writer.close(PATIENT_S)
+    assert writer.problem == ""
 
 
 def test_what_comes_after_the_end_is_done_at_once() -> None:
@@ -167,4 +179,13 @@ def test_p10_a_file_is_replaced_whole_or_not_at_all(tmp_path: Path, monkeypatch:
     with pytest.raises(OSError, match="No space"):
         replace_file(path, b"new")
     assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_p10_what_a_killed_process_left_unfinished_is_taken_up_again(tmp_path: Path) -> None:
+    """However many were killed on a full disk: their pieces would fill it further."""
+    path = tmp_path / "x"
+    (tmp_path / ".x.new").write_bytes(b"a piece of something long")
+    replace_file(path, b"whole")
+    assert path.read_bytes() == b"whole"
     assert list(tmp_path.iterdir()) == [path]

@@ -52,7 +52,8 @@ def write_carry_over(path: Path, satellite: str, carried: CarryOver) -> None:
 class FitKeeper:
     """Saves the newest fit of a pass, at most once in ten seconds, and at the end.
 
-    The loop never waits for the disk.  A write that fails is logged once and never stops a pass.
+    The loop never waits for the disk.  A write that fails never stops a pass: it is logged at each edge, and done again
+    with the next fit, or at the end.
     """
 
     def __init__(
@@ -62,34 +63,38 @@ class FitKeeper:
         self._satellite = satellite
         self._carry_over_of = carry_over_of
         self._latest = Latest(writer, self._save)
-        self._unsaved: FitResult | None = None
+        self._newest: FitResult | None = None
         self._saved_tai_s = -math.inf
-        self._has_failed = False
+        self.problem = ""  # why the newest one is not saved
 
     def offer(self, fit: FitResult) -> None:
         """Take an accepted fit."""
-        self._unsaved = fit
-        if fit.at_tai_s - self._saved_tai_s >= SAVE_PERIOD_S:
+        self._newest = fit
+        if self.problem or fit.at_tai_s - self._saved_tai_s >= SAVE_PERIOD_S:
             self.flush()
 
     def flush(self) -> None:
         """Save what is not saved yet."""
-        if self._unsaved is not None:
-            self._saved_tai_s = self._unsaved.at_tai_s
-            self._latest.offer(self._unsaved)
-            self._unsaved = None
+        fit = self._newest
+        if fit is not None and (self.problem or fit.at_tai_s > self._saved_tai_s):
+            self._saved_tai_s = fit.at_tai_s
+            self._latest.offer(fit)
 
     def _save(self, fit: FitResult) -> None:
+        log: Any = structlog.get_logger("carry_over")
         try:
             carried = self._carry_over_of(fit)
             if carried is not None:
                 write_carry_over(self._path, self._satellite, carried)
         except (OSError, ValueError, OrbitError) as error:
-            if not self._has_failed:
-                self._has_failed = True
-                structlog.get_logger("carry_over").warning(
-                    "carry_over.not_saved", file=str(self._path), reason=str(error)
-                )
+            reason = reason_of(error) if isinstance(error, OSError) else str(error)
+            if not self.problem:
+                log.warning("carry_over.not_saved", file=str(self._path), reason=reason)
+            self.problem = f"{self._path.name}: {reason}"
+            return
+        if self.problem:
+            log.info("carry_over.saved_again", file=str(self._path))
+            self.problem = ""
 
 
 def to_json(satellite: str, carried: CarryOver) -> dict[str, Any]:

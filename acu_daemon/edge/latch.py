@@ -46,9 +46,10 @@ class LatchKeeper:
         self._name = name
         self._path = directory / name
         self._clock = clock
-        self._wanted = self._saved = first
+        self._wanted = first
+        self._saved: str | None = first  # None: who knows what the file holds now
         self._latest: Latest[str] = Latest(writer, self._save)
-        self._has_failed = False
+        self.problem = ""  # why what is wanted is not saved
 
     def see(self, text: str) -> None:
         """Take what a tick says; "": nothing."""
@@ -63,14 +64,15 @@ class LatchKeeper:
         try:
             self._put(text)
         except OSError as error:
-            if not self._has_failed:
+            self._saved = None
+            if not self.problem:
                 log.error(f"{self._name}.not_saved", file=str(self._path), text=text, reason=str(error))
-            self._has_failed = True
+            self.problem = f"{self._name}: {error.strerror}"
             return
         self._saved = text
-        if self._has_failed:
+        if self.problem:
             log.info(f"{self._name}.saved_again", file=str(self._path))
-            self._has_failed = False
+            self.problem = ""
 
     def _put(self, text: str) -> None:
         if not text:

@@ -48,6 +48,7 @@ class RecordingWriter:
         self._last_us = -math.inf if last_tai_s is None else round(last_tai_s * 1e6)
         self._synced_tai_s = -math.inf
         self._lost_count = 0
+        self._failure = ""
         self._has_header = self._is_file and os.fstat(self._fd).st_size > 0
         self._log: Any = structlog.get_logger("record")
         if not self._has_header:
@@ -56,9 +57,9 @@ class RecordingWriter:
                 self._has_header = True
 
     @property
-    def has_failed(self) -> bool:
-        """Whether the newest line could not be written."""
-        return self._lost_count > 0
+    def problem(self) -> str:
+        """Why the newest line could not be written; "": it was."""
+        return f"{self._path.name}: {self._failure}" if self._failure else ""
 
     def add(self, reading: Reading) -> None:
         """Write one reading; a reading not later than the one before is left out, since times must rise."""
@@ -71,7 +72,7 @@ class RecordingWriter:
         if self._writer is None:
             self._write(line, reading.tai_s)
         elif not self._writer.put(partial(self._write, line, reading.tai_s)):
-            self._lost_count += 1
+            self._lose("the disk does not keep up")
 
     def _write(self, line: str, tai_s: float) -> None:
         try:
@@ -80,23 +81,26 @@ class RecordingWriter:
                 self._synced_tai_s = tai_s
                 self._sync()
         except OSError as error:
-            if not self._lost_count:
-                self._log.warning("record.failed", file=str(self._path), reason=error.strerror)
-            self._lost_count += 1
+            self._lose(error.strerror or str(error))
             return
         self._has_header = True
-        if self._lost_count:
+        if self._failure:
             self._log.info("record.resumed", file=str(self._path), lost_count=self._lost_count)
-            self._lost_count = 0
+            self._lost_count, self._failure = 0, ""
+
+    def _lose(self, reason: str) -> None:
+        if not self._failure:
+            self._log.warning("record.failed", file=str(self._path), reason=reason)
+        self._lost_count += 1
+        self._failure = reason
 
     def _append(self, text: str) -> None:
         """Append whole lines, or nothing.  OSError: nothing."""
         data = text.encode("ascii")
         size = os.fstat(self._fd).st_size
         try:
-            written = os.write(self._fd, data)
-            if written < len(data):
-                os.write(self._fd, data[written:])  # says why
+            while data:  # after a part of it, the next one says why
+                data = data[os.write(self._fd, data) :]
         except OSError:
             if self._is_file:
                 os.ftruncate(self._fd, size)

@@ -25,6 +25,7 @@ from acu_daemon.orbit.timescales import utc_text
 VERSION = 1
 RUN_STATE = "run.json"
 SAME_CLOCK_S = 1.0
+RETRY_TICKS = 10  # of a write that failed
 _LARGEST_BYTES = 100_000
 
 
@@ -76,7 +77,7 @@ def read_run_state(directory: Path) -> RunState:
 
 
 class RunStateKeeper:
-    """Writes run.json.  The loop never waits for the disk, and a write that fails never stops a pass."""
+    """Writes run.json.  The loop never waits for the disk, and a write that fails stops no pass: it is tried again."""
 
     def __init__(
         self, directory: Path, writer: Writer, first: RunState, resume_of: Callable[[FitResult], CarryOver | None]
@@ -86,7 +87,8 @@ class RunStateKeeper:
         self._resume_of = resume_of
         self._latest: Latest[tuple[RunState, FitResult | None]] = Latest(writer, self._save)
         self._fit: FitResult | None = None
-        self._has_failed = False
+        self._tick_count = 0
+        self.problem = ""  # why the newest one is not saved
 
     def offer(self, fit: FitResult) -> None:
         """Take an accepted fit."""
@@ -99,24 +101,28 @@ class RunStateKeeper:
         seen = replace(
             self._state, track=str(state.track), arming=state.arming, held=held, is_stow_kept=state.is_stow_kept
         )
-        if seen != self._state:
+        self._tick_count += 1
+        is_retried = bool(self.problem) and self._tick_count % RETRY_TICKS == 0
+        if seen != self._state or is_retried:
             self._state = seen
             self._latest.offer((seen, self._fit))
 
     def _save(self, newest: tuple[RunState, FitResult | None]) -> None:
         state, fit = newest
+        log: Any = structlog.get_logger("run_state")
         try:
             kept = None if fit is None else self._resume_of(fit)
             text = json.dumps(_to_json(replace(state, fit=kept or state.fit)), indent=1, allow_nan=False)
             replace_file(self._path, text.encode("ascii"))
         except (OSError, ValueError, OrbitError) as error:
-            if not self._has_failed:
-                structlog.get_logger("run_state").error("run_state.not_saved", file=str(self._path), reason=str(error))
-            self._has_failed = True
+            reason = reason_of(error) if isinstance(error, OSError) else str(error)
+            if not self.problem:
+                log.error("run_state.not_saved", file=str(self._path), reason=reason)
+            self.problem = f"{RUN_STATE}: {reason}"
             return
-        if self._has_failed:
-            structlog.get_logger("run_state").info("run_state.saved_again", file=str(self._path))
-            self._has_failed = False
+        if self.problem:
+            log.info("run_state.saved_again", file=str(self._path))
+            self.problem = ""
 
 
 def _to_json(state: RunState) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from acu_daemon.edge.writer import Latest, Writer
+from acu_daemon.edge.writer import Latest, Writer, replace_file
 from acu_daemon.errors import UsageError
 
 if TYPE_CHECKING:
@@ -64,7 +64,6 @@ class SnapshotFile:
         """snapshot_ticks: a snapshot comes every so many ticks."""
         self._every_count = EVERY_TICKS // snapshot_ticks
         self._path = directory / SNAPSHOT
-        self._unfinished = directory / f".{SNAPSHOT}.{os.getpid()}"
         self._latest: Latest[DataclassInstance] = Latest(writer, self._save)
         self._skip = 0
         self.failed_count = 0
@@ -77,7 +76,6 @@ class SnapshotFile:
 
     def _save(self, seen: "DataclassInstance") -> None:
         try:
-            self._unfinished.write_text(json.dumps(asdict(seen)), encoding="utf-8")
-            self._unfinished.replace(self._path)
+            replace_file(self._path, json.dumps(asdict(seen)).encode(), is_synced=False)
         except OSError:
             self.failed_count += 1

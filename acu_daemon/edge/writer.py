@@ -3,6 +3,7 @@
 import contextlib
 import os
 import threading
+import time
 from collections import deque
 from collections.abc import Callable
 from functools import partial
@@ -17,6 +18,7 @@ Value = TypeVar("Value")
 LIMIT = 1000
 CLOSE_S = 2.0
 LIVE_LIMIT = 20  # a live line is not drawn while so much waits before it
+STUCK_S = 3.0  # a disk that a job has waited for so long is no more slow but stuck
 
 
 class Writer:
@@ -31,6 +33,7 @@ class Writer:
         self._jobs: SimpleQueue[Job | None] = SimpleQueue()
         self._is_closed = False
         self._told_count = 0
+        self._begun_s: float | None = None  # when the job in hand began, on the monotonic clock
         self.dropped_count = 0
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)  # a stuck one holds no exit up
         self._thread.start()
@@ -38,6 +41,14 @@ class Writer:
     @property
     def waiting_count(self) -> int:
         return self._jobs.qsize()
+
+    @property
+    def problem(self) -> str:
+        """That the job in hand does not end; "": all is well."""
+        begun_s = self._begun_s
+        if begun_s is None or time.monotonic() - begun_s < STUCK_S:
+            return ""
+        return f"the disk has not answered for {time.monotonic() - begun_s:.0f} s"
 
     def put(self, job: Job) -> bool:
         """Have a job done; never waits.  False: dropped.
@@ -63,10 +74,12 @@ class Writer:
 
     def _work(self) -> None:
         while (job := self._jobs.get()) is not None:
+            self._begun_s = time.monotonic()
             try:
                 job()
             except Exception as error:  # noqa: BLE001  one bad job must not end all others
                 structlog.get_logger("writer").error("writer.failed", reason=f"{type(error).__name__}: {error}")
+            self._begun_s = None
             if self._jobs.empty():
                 self._tell()
         self._tell()
@@ -139,20 +152,26 @@ def write_text(stream: TextIO | None, text: str) -> None:
             data = data[os.write(fd, data) :]
 
 
-def replace_file(path: Path, data: bytes) -> None:
-    """Put a file in place, whole: written beside it, on the disk, renamed.  OSError: it cannot be."""
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
+def replace_file(path: Path, data: bytes, *, is_synced: bool = True) -> None:
+    """Put a file in place, whole: written beside it, on the disk, renamed.  OSError: it cannot be.
+
+    is_synced: it is on the disk then, so that it outlives a loss of power.  What a killed process left unfinished, the
+    next one takes up again: on a full disk every one of them would cost room.
+    """
+    unfinished = path.with_name(f".{path.name}.new")
     try:
         with unfinished.open("wb") as file:
             file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
+            if is_synced:
+                file.flush()
+                os.fsync(file.fileno())
         unfinished.replace(path)
     except OSError:
         with contextlib.suppress(OSError):
             unfinished.unlink()
         raise
-    _sync_directory(path.parent)
+    if is_synced:
+        _sync_directory(path.parent)
 
 
 def remove_file(path: Path) -> None:
