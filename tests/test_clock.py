@@ -78,7 +78,7 @@ def test_a_rehearsal_follows_no_system_clock(ground: Ground) -> None:
 
 
 @pytest.mark.parametrize("step_s", [3600.0, 1.0, -1.0, -0.11])
-def test_a_step_of_the_system_clock_is_told_and_never_obeyed(ground: Ground, step_s: float) -> None:
+def test_p7_a_step_of_the_system_clock_is_told_and_never_obeyed(ground: Ground, step_s: float) -> None:
     clock = SystemClock()
     start = clock.tai_s()
     ground.unix_s += step_s

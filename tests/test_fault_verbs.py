@@ -16,6 +16,7 @@ from acu_daemon.sim.fault_board import FaultBoard
 from acu_daemon.sim.fault_control import answer_line
 from acu_daemon.sim.fault_verbs import (
     VERBS,
+    Direction,
     Fault,
     FaultError,
     VerbName,
@@ -126,8 +127,8 @@ def test_a_probability_is_rolled_for_every_time_it_happens_and_a_seed_repeats_it
     assert 10 < len(times[0]) < 30
 
 
-def strikes(text: str, frame_count: int) -> list[bool]:
-    """Which frames, one each 0.1 s, a fault hits."""
+def strikes(text: str, frame_count: int, way: Direction = "reply") -> list[bool]:
+    """Which frames of a direction, one each 0.1 s, a fault hits."""
 
     async def main() -> list[bool]:
         board = FaultBoard()
@@ -136,7 +137,7 @@ def strikes(text: str, frame_count: int) -> list[bool]:
         hits = []
         for _ in range(frame_count):
             await asyncio.sleep(0.1)
-            hits.append(board.strike(fault.verb, "reply") is not None)
+            hits.append(board.strike(fault.verb, way) is not None)
         return hits
 
     return run_virtual(main())
@@ -149,6 +150,13 @@ def test_a_fault_of_frames_hits_as_many_as_its_count_within_its_time() -> None:
     some = strikes("no-reply probability=0.3 seed=3", 400)
     assert sum(some) == pytest.approx(120, abs=40)
     assert some == strikes("no-reply probability=0.3 seed=3", 400)
+
+
+@pytest.mark.parametrize("way", ["reply", "command"])
+def test_a_wrong_baud_rate_hits_both_directions_and_other_faults_the_one_they_name(way: Direction) -> None:
+    assert strikes("wrong-baud", 1, way) == strikes("nak", 1, way) == [True]
+    assert strikes("truncated", 1, way) == [way == "reply"]
+    assert strikes("truncated on=command", 1, way) == [way == "command"]
 
 
 def test_the_control_port_adds_lists_and_clears() -> None:
