@@ -3,6 +3,7 @@
 import io
 from dataclasses import replace
 
+from acu_daemon.daemon.health import status_line
 from acu_daemon.daemon.live import LiveLine, live_text
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.orbit.timescales import tai_from_utc
@@ -73,6 +74,13 @@ def test_what_is_not_known_is_a_dash() -> None:
     text = live_text(replace(SEEN, miss_deg=None, along_s=None, across_deg=None, az_deg=None))
     assert "off prediction     - deg" in text
     assert "no fit yet" in text
+
+
+def test_p10_a_file_that_cannot_be_written_stands_on_it_and_on_the_services_line() -> None:
+    seen = replace(SEEN, files_alarm="run.json: No space left on device")
+    for text, plain in ((live_text(seen), live_text(SEEN)), (status_line(seen), status_line(SEEN))):
+        assert "not written: run.json: No space left on device" in text
+        assert "not written" not in plain
 
 
 def test_a_simulation_that_knows_the_sky_shows_the_beam_error() -> None:

@@ -47,6 +47,12 @@ class Kept:
         self.disarms.see(state.disarmed_by)
         self.run_state.see(state)
 
+    @property
+    def problem(self) -> str:
+        """What of it cannot be written now, and why; "": all is."""
+        keepers = (self.run_state, self.carry_over, self.latches, self.disarms)
+        return "; ".join(keeper.problem for keeper in keepers if keeper.problem)
+
     def flush(self) -> None:
         """Save what is not saved yet."""
         self.carry_over.flush()

@@ -219,6 +219,10 @@ async def _run(
         if live is not None:
             live.show(seen)
 
+    def files_alarm() -> str:
+        problems = (files.problem, recording.problem if recording else "", kept.problem)
+        return "; ".join(problem for problem in problems if problem)
+
     service = Service(
         job,
         link,
@@ -229,6 +233,7 @@ async def _run(
         on_reading=recording.add if recording else None,
         on_fit=kept.offer,
         on_state=kept.see,
+        files_alarm=files_alarm,
     )
     loop = asyncio.get_running_loop()
     for number in STOP_SIGNALS:

@@ -41,6 +41,7 @@ def live_text(seen: Snapshot, beam_error_deg: float | None = None) -> str:
         f"rejecting: {seen.rejecting}" if seen.rejecting else "",
         seen.encoder_problem,
         seen.clock_alarm,
+        f"not written: {seen.files_alarm}" if seen.files_alarm else "",
     ]
     return "  ".join(part for part in parts if part).rstrip()
 

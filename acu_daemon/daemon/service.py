@@ -82,6 +82,7 @@ class Service:
         on_reading: Callable[[Reading], None] | None = None,
         on_fit: Callable[[FitResult], None] | None = None,
         on_state: Callable[[ControlState], None] | None = None,
+        files_alarm: Callable[[], str] = str,
     ) -> None:
         self._job = job
         self._clock = clock
@@ -89,6 +90,7 @@ class Service:
         self._on_snapshot = on_snapshot
         self._snapshot_ticks = snapshot_ticks
         self._on_state = on_state
+        self._files_alarm = files_alarm
         self._ticked = asyncio.Event()
         self._stop_reason = ""
         self._log: Any = structlog.get_logger("pass")
@@ -222,6 +224,7 @@ class Service:
             self._job.control,
             self._clock.tai_s(),
             is_rehearsal=self._job.is_rehearsal,
+            files_alarm=self._files_alarm(),
         )
 
     def answer(self, line: str) -> str:

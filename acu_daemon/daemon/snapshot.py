@@ -55,6 +55,7 @@ class Snapshot:
     encoder_problem: str = ""
     clock_alarm: str = ""
     line_alarm: str = ""
+    files_alarm: str = ""  # what cannot be written: recording, state
     clamped_count: int = 0  # followed writes that the gate held back to what the axes can do
     rejecting: str = ""  # why the newest readings are not fitted
     rejected_counts: dict[str, int] = field(default_factory=dict)  # readings so far, by reason
@@ -68,6 +69,7 @@ def take_snapshot(
     now_tai_s: float,
     *,
     is_rehearsal: bool,
+    files_alarm: str,
 ) -> Snapshot:
     """What there is to see now."""
     state, sky = area.state, area.sky
@@ -109,6 +111,7 @@ def take_snapshot(
         latch=state.latch,
         clock_alarm=foreground.clock_watch.alarm,
         line_alarm=foreground.line_watch.alarm,
+        files_alarm=files_alarm,
         encoder_problem=state.encoders.problem,
         is_link_up=port.is_up,
         link_problem=port.problem,
