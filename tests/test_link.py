@@ -3,13 +3,18 @@
 import asyncio
 import errno
 import os
+import socket
+import termios
+import threading
 import tty
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import serial
 
+from acu_daemon.edge.arrivals import MAX_WAITING_BYTES, Arrivals
 from acu_daemon.edge.link import check_rate, make_link
 from acu_daemon.edge.serial_port import SerialLink
 from acu_daemon.errors import LinkError, LinkRefusedError, UsageError
@@ -76,6 +81,74 @@ async def test_a_port_where_nobody_listens_is_refused_with_advice() -> None:
     await server.wait_closed()
     with pytest.raises(LinkRefusedError, match="nobody listens"):
         await make_link(url).open()
+
+
+@pytest.mark.parametrize("host", ["acu..local", "a" * 70])
+async def test_a_name_that_is_none_is_a_link_error(host: str) -> None:
+    with pytest.raises(LinkError, match="is no name of a host"):
+        await make_link(f"tcp://{host}:3842").open()
+
+
+class NameServer:
+    """Looks names up like the system's until it hangs."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self._look_up = socket.getaddrinfo
+        self.may_answer = threading.Event()
+        self.may_answer.set()
+        self.waiting_count = 0
+        monkeypatch.setattr(socket, "getaddrinfo", self.getaddrinfo)
+
+    def getaddrinfo(self, *arguments: Any, **more: Any) -> Any:
+        self.waiting_count += 1
+        self.may_answer.wait(10.0)
+        self.waiting_count -= 1
+        return self._look_up(*arguments, **more)
+
+
+def test_a_name_server_that_hangs_is_asked_once_and_holds_no_end_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    server = NameServer(monkeypatch)
+    server.may_answer.clear()
+
+    async def open_twice() -> None:
+        link = make_link("tcp://acu.example:3842")
+        for _ in range(2):
+            with pytest.raises(LinkError, match="does not answer within 1 s"):
+                await link.open()
+        assert server.waiting_count == 1
+
+    asyncio.run(open_twice())
+    assert server.waiting_count == 1, "the end has waited for the name server"
+    server.may_answer.set()
+
+
+async def test_a_link_is_opened_again_while_the_name_server_hangs(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def accept(_reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.close()
+
+    listener, url = await tcp_server(accept)
+    server, link = NameServer(monkeypatch), make_link(url.replace("127.0.0.1", "localhost"))
+    await link.open()
+    await link.close()
+    server.may_answer.clear()
+    await link.open()
+    await link.close()
+    server.may_answer.set()
+    listener.close()
+    await listener.wait_closed()
+
+
+async def test_of_a_line_that_babbles_only_the_newest_bytes_wait() -> None:
+    arrivals = Arrivals()
+    for k in range(100):
+        arrivals.put(b"x" * 65536 + b"%02d" % k, float(k))
+    waiting, arrival_s = await arrivals.get()
+    assert len(waiting) <= MAX_WAITING_BYTES
+    assert (waiting[-2:], arrival_s) == (b"99", 99.0)
+    for k in range(2 * MAX_WAITING_BYTES):
+        arrivals.put(b"y", float(k))
+    newest = [await arrivals.get() for _ in range(MAX_WAITING_BYTES)]
+    assert newest[-1] == (b"y", 2.0 * MAX_WAITING_BYTES - 1.0)
 
 
 async def test_a_closed_link_says_so_and_closing_twice_is_harmless() -> None:
@@ -180,6 +253,23 @@ async def test_a_serial_port_is_opened_exclusively(pty: Pty) -> None:
 async def test_a_missing_port_is_named_with_a_hint(tmp_path: Path) -> None:
     with pytest.raises(LinkError, match="is the adapter plugged in"):
         await make_link(f"serial://{tmp_path}/ttyUSB9").open()
+
+
+@pytest.mark.parametrize(
+    ("step", "error"), [("_update_dtr_state", OSError(5, "EIO")), ("reset_input_buffer", termios.error(5, "EIO"))]
+)
+async def test_an_adapter_that_is_unplugged_while_it_is_opened_is_a_link_error(
+    pty: Pty, step: str, error: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(_port: serial.Serial) -> None:
+        raise error
+
+    link = make_link(f"serial://{pty.path}")
+    with monkeypatch.context() as unplugged, pytest.raises(LinkError, match="EIO"):
+        unplugged.setattr(serial.Serial, step, fail)
+        await link.open()
+    await link.open()
+    await link.close()
 
 
 @pytest.mark.parametrize(("text", "expected"), [("8N1", (8, "N")), ("7E1", (7, "E"))])

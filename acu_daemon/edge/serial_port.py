@@ -32,21 +32,29 @@ class SerialLink:
 
     async def open(self) -> None:
         """Open the port exclusively.  LinkRefusedError: another program holds it; LinkError: there is no such port."""
-        bytesize, parity = CHARACTER_FORMATS["8N1" if _is_pseudo_terminal(self._path) else self._format]
         try:
-            port = serial.Serial(self._path, self._baud, bytesize, parity, timeout=0, write_timeout=0, exclusive=True)
-        except serial.SerialException as error:
+            port = self._make_port()
+        except OSError as error:  # also when it is unplugged just now
             raise self._open_error(error) from None
         except termios.error as error:
             raise LinkError(f"{self._path} cannot do {self._baud} baud {self._format}: {error.args[-1]}") from None
-        with contextlib.suppress(OSError, ValueError, NotImplementedError):
-            port.set_low_latency_mode(True)  # an FTDI adapter otherwise adds 16 ms to every reply
-        os.set_blocking(port.fileno(), False)
-        port.reset_input_buffer()
         self._port, self._arrivals, self._unsent = port, Arrivals(), b""
         asyncio.get_running_loop().add_reader(port.fileno(), self._on_readable)
 
-    def _open_error(self, error: serial.SerialException) -> LinkError:
+    def _make_port(self) -> serial.Serial:
+        bytesize, parity = CHARACTER_FORMATS["8N1" if _is_pseudo_terminal(self._path) else self._format]
+        port = serial.Serial(self._path, self._baud, bytesize, parity, timeout=0, write_timeout=0, exclusive=True)
+        try:
+            with contextlib.suppress(OSError, ValueError, NotImplementedError):
+                port.set_low_latency_mode(True)  # an FTDI adapter otherwise adds 16 ms to every reply
+            os.set_blocking(port.fileno(), False)
+            port.reset_input_buffer()
+        except BaseException:
+            port.close()
+            raise
+        return port
+
+    def _open_error(self, error: OSError) -> LinkError:
         if error.errno in (errno.EAGAIN, errno.EBUSY):
             return LinkRefusedError(f"{self._path} is held by another program; stop it first")
         hint = {

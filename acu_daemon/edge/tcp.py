@@ -5,8 +5,10 @@ import contextlib
 import socket
 import struct
 from collections.abc import Callable
+from functools import partial
 
 from acu_daemon.edge.arrivals import Arrivals
+from acu_daemon.edge.host_name import HostName
 from acu_daemon.errors import LinkError, LinkRefusedError
 
 CONNECT_TIMEOUT_S = 1.0  # with the back-off still well inside the service's watchdog
@@ -17,7 +19,7 @@ class TcpLink:
     """A TCP connection to an ACU or to a terminal server in front of it; can be opened again after close()."""
 
     def __init__(self, host: str, port: int, byte_time_s: float, monotonic: Callable[[], float]) -> None:
-        self._host, self._port = host, port
+        self._name, self._port = HostName(host), port
         self._monotonic = monotonic
         self.byte_time_s = byte_time_s
         baud = f"?baud={round(10.0 / byte_time_s)}" if byte_time_s else ""
@@ -26,11 +28,9 @@ class TcpLink:
 
     async def open(self) -> None:
         """Connect.  LinkRefusedError: nobody listens; LinkError: no way there."""
-        loop = asyncio.get_running_loop()
-        connection = _Connection(self.description, self._monotonic)
         try:
             async with asyncio.timeout(CONNECT_TIMEOUT_S):
-                await loop.create_connection(lambda: connection, self._host, self._port)
+                self._connection = await self._connect()
         except TimeoutError:
             raise LinkError(
                 f"{self.description} does not answer within {CONNECT_TIMEOUT_S:g} s: "
@@ -42,7 +42,19 @@ class TcpLink:
             ) from None
         except OSError as error:
             raise LinkError(f"{self.description} cannot be reached: {error.strerror or error}") from None
-        self._connection = connection
+
+    async def _connect(self) -> "_Connection":
+        """Try the addresses of the host, in their order; the last one says why none answers."""
+        loop, refused = asyncio.get_running_loop(), OSError("the host has no address")
+        make = partial(_Connection, self.description, self._monotonic)
+        for address in await self._name.addresses():
+            try:
+                _, connection = await loop.create_connection(make, address, self._port)
+            except OSError as error:
+                refused = error
+            else:
+                return connection
+        raise refused
 
     def write(self, data: bytes) -> None:
         """Send; never waits.  LinkError: not connected."""
