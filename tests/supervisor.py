@@ -93,8 +93,9 @@ class Supervisor:
             if result == "success" and not self._is_stopping.is_set():
                 self._call("ExecStop", {})
             self.results.append(result)
-            self._call("ExecStopPost", {"SERVICE_RESULT": result})
-            if str(self.process.returncode) in self._unit["RestartPreventExitStatus"]:
+            status = str(self.process.returncode)
+            self._call("ExecStopPost", {"SERVICE_RESULT": result, "EXIT_STATUS": status})
+            if status in self._unit["RestartPreventExitStatus"]:
                 return
             self._is_stopping.wait(self._seconds("RestartSec"))
 

@@ -173,3 +173,19 @@ def test_a_refused_configuration_is_not_started_again(rig: Any, tmp_path: Path) 
         time.sleep(1.0)
     assert running.results == ["exit-code"]
     assert len(running.starts_s) == 1
+
+
+@realtime
+def test_p4_a_daemon_killed_in_mid_pass_that_is_refused_its_next_start_leaves_its_antenna_stopped(
+    rig: Any, tmp_path: Path
+) -> None:
+    """Nobody comes back: the service's own safe stop ends the autotrack."""
+    with service(rig, tmp_path) as running:
+        wait_until(lambda: any("AUTOTRACK" in status for status in running.statuses))
+        (rig.config / "satellites" / f"{rig.scene.satellite}.toml").write_text("[satellite]\n")
+        assert running.process is not None
+        running.process.kill()
+        wait_until(lambda: len(running.post_codes) == 2)
+    assert running.results == ["signal", "exit-code"]
+    assert running.post_codes == [0, 0]
+    assert last_mode(rig) == "STANDBY"
