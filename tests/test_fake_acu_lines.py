@@ -19,8 +19,9 @@ from acu_daemon.sim.fault_board import FaultBoard
 from acu_daemon.sim.line import AcuLine
 from acu_daemon.sim.memory import MemoryLink
 from acu_daemon.sim.parts import AcuParts
+from acu_daemon.sim.pty import serve_pty
 from acu_daemon.sim.scenario import AcuChoice, Scenario
-from acu_daemon.sim.server import acu_peer, keep_time, serve_pty, serve_tcp
+from acu_daemon.sim.server import acu_peer, keep_time, serve_tcp
 from acu_daemon.sim.trace import TraceRow
 from acu_daemon.sim.virtual import StandstillError, VirtualTimeLoop, run_virtual
 
@@ -261,10 +262,36 @@ async def test_a_host_speaks_with_the_simulation_over_a_pseudo_terminal(tmp_path
     assert not path.is_symlink()
 
 
+async def test_a_pty_link_that_is_served_is_refused_and_works_on_and_a_dead_one_is_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "acu"
+    path.symlink_to("/dev/pts/4000000")
+    async with serving_pty(path, 38400) as url:
+        device = path.readlink()
+        with pytest.raises(UsageError, match="is served already"):
+            async with serving_pty(tmp_path / "." / "acu", 9600):
+                pass
+        assert path.readlink() == device
+        link = make_link(url)
+        await link.open()
+        check(await dialogue(link))
+        await link.close()
+    async with serving_pty(path, 9600):
+        assert path.is_symlink()
+
+
+async def test_a_pty_link_never_replaces_an_adapters_name(tmp_path: Path) -> None:
+    (tmp_path / "ttyUSB0").touch()
+    (tmp_path / "by-id").symlink_to(tmp_path / "ttyUSB0")
+    with pytest.raises(UsageError, match="no link to a pseudo terminal"):
+        async with serving_pty(tmp_path / "by-id", 9600):
+            pass
+    assert (tmp_path / "by-id").readlink() == tmp_path / "ttyUSB0"
+
+
 async def test_a_pty_link_never_replaces_a_file(tmp_path: Path) -> None:
     file = tmp_path / "precious"
     file.write_text("data")
-    with pytest.raises(UsageError, match="no symbolic link"):
+    with pytest.raises(UsageError, match="no link to a pseudo terminal"):
         async with serving_pty(file, 9600):
             pass
     with pytest.raises(UsageError, match="cannot be made"):

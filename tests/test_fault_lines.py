@@ -21,8 +21,9 @@ from acu_daemon.sim.fault_control import serve_control
 from acu_daemon.sim.fault_verbs import parse_fault
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.proxy import proxy_peer
+from acu_daemon.sim.pty import serve_pty
 from acu_daemon.sim.scenario import AcuChoice, Scenario
-from acu_daemon.sim.server import acu_peer, serve_pty, serve_tcp
+from acu_daemon.sim.server import acu_peer, serve_tcp
 
 BAUD = 115200
 PATIENCE_S = 10.0

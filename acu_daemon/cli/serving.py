@@ -15,7 +15,8 @@ from acu_daemon.errors import UsageError
 from acu_daemon.sim.fault_board import FaultBoard
 from acu_daemon.sim.fault_control import serve_control
 from acu_daemon.sim.fault_verbs import Fault, FaultError, VerbName
-from acu_daemon.sim.server import PTY_FAULTS, TCP_FAULTS, MakePeer, serve_pty, serve_tcp
+from acu_daemon.sim.pty import PTY_FAULTS, serve_pty
+from acu_daemon.sim.server import TCP_FAULTS, MakePeer, serve_tcp
 
 Control = Annotated[
     str | None,
