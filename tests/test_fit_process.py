@@ -162,7 +162,8 @@ async def test_the_child_is_nice_and_ends_with_its_parent() -> None:
     await runner.refit(request(0))
     child = runner.pid
     assert child is not None
-    assert os.getpriority(os.PRIO_PROCESS, child) == min(19, os.getpriority(os.PRIO_PROCESS, 0) + 10)
+    own = os.getpriority(os.PRIO_PROCESS, 0)
+    assert os.getpriority(os.PRIO_PROCESS, child) == min(19, max(10, own + 10))
     await runner.close()
     assert runner.pid is None
     with pytest.raises(ProcessLookupError):
@@ -177,8 +178,24 @@ def test_a_child_whose_parent_is_gone_ends_by_itself_without_a_word() -> None:
     assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
 
 
+@pytest.mark.parametrize(("daemons", "childs"), [(-10, 10), (0, 10), (4, 14)])
+def test_the_child_is_nice_however_its_parent_is(daemons: int, childs: int) -> None:
+    code = f"import os; os.nice({daemons} - os.nice(0)); from acu_daemon.edge.fit_child import be_nice; be_nice()"
+    done = subprocess.run([sys.executable, "-c", f"{code}; print(os.nice(0))"], capture_output=True, text=True)
+    if "PermissionError" in done.stderr:
+        pytest.skip(f"only root may make a process {daemons}")
+    assert done.stdout == f"{childs}\n"
+
+
+def loaded_by(module: str) -> set[str]:
+    code = f"import {module}, sys; print(*sys.modules)"
+    return set(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split())
+
+
+def test_the_child_is_nice_before_it_loads_what_takes_long() -> None:
+    assert "numpy" not in loaded_by("acu_daemon.edge.fit_child")
+
+
 def test_the_child_loads_only_what_a_fit_needs() -> None:
-    code = "import acu_daemon.edge.fit_child, sys; print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    loaded = set(done.stdout.split())
+    loaded = loaded_by("acu_daemon.edge.fit_child") | loaded_by("acu_daemon.control.refit")
     assert not loaded & {"asyncio", "structlog", "rich", "pydantic", "typer", "serial", "matplotlib"}

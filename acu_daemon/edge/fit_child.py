@@ -1,23 +1,25 @@
 """The fit's child process: requests in, replies out, as length-prefixed pickles over its standard input and output.
 
-It loads what a fit needs and nothing else: no event loop, no logging.
+It loads what a fit needs and nothing else: no event loop, no logging.  It makes itself nice before it loads that: the
+daemon that starts it has its first commands to write meanwhile.
 """
 
 import contextlib
+import gc
 import os
 import pickle
 import signal
 import struct
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from acu_daemon.control.refit import RefitReply, RefitRequest, Refitter
 from acu_daemon.errors import OrbitError
 
+if TYPE_CHECKING:
+    from acu_daemon.control.refit import RefitReply, RefitRequest
+
 LENGTH = struct.Struct("<Q")
-NICENESS = 10
+NICENESS = 10  # more than the daemon's, and at least this where that one's is negative
 
 
 def _read(size: int) -> bytes:
@@ -32,10 +34,22 @@ def _receive() -> Any:
     return pickle.loads(_read(size))
 
 
+def be_nice() -> None:
+    """Leave the processor to the daemon and to everybody else."""
+    os.nice(max(NICENESS, NICENESS - os.getpriority(os.PRIO_PROCESS, 0)))
+
+
 def serve() -> None:
     """Serve requests until the parent closes the pipe."""
-    os.nice(NICENESS)
+    be_nice()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a Ctrl-C is for the daemon, which ends the child itself
+    gc.disable()  # what is loaded is no garbage
+    import numpy as np
+
+    from acu_daemon.control.refit import Refitter
+
+    gc.freeze()
+    gc.enable()
     refitter = Refitter(_receive())
     while True:
         request: RefitRequest = _receive()
