@@ -1,5 +1,6 @@
 """The command line itself: one typer app, and the exit status of every kind of failure."""
 
+import gc
 import os
 import sys
 import traceback
@@ -80,7 +81,10 @@ def main() -> None:
     """Run a command; every failure ends with its exit status and a message that says what to do."""
     asked = sys.argv[1:2]
     try:
-        make_app(asked if asked and asked[0] in COMMANDS else COMMANDS)()
+        app = make_app(asked if asked and asked[0] in COMMANDS else COMMANDS)
+        gc.freeze()  # what was loaded stays: no collection has to look at it again
+        gc.enable()
+        app()
     except NoAcuError as error:
         _complain(error)
         sys.exit(EXIT_NO_ACU)

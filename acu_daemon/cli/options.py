@@ -23,6 +23,7 @@ from acu_daemon.pointing.keyhole import longest_window_s
 from acu_daemon.units import DAY_S
 
 NEXT_PASS_DAYS = 3.0
+SOON_S = 1800.0  # a pass that is over by then is looked for first: a restart in mid-pass is in a hurry
 STOP_SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)  # a closed terminal stops safely too
 SPARE_S = 30.0  # what a buffer and a fit look at beyond the times they are for, with some to spare
 
@@ -103,24 +104,25 @@ def coming_pass(target: Target, now_tai_s: float) -> Pass:
 
     UsageError: none within three days, or one that the elements do not cover from its preparation to its last buffer.
     """
-    passes = find_passes(
-        target.elements.propagator,
-        target.station.site,
-        now_tai_s,
-        now_tai_s + NEXT_PASS_DAYS * DAY_S,
-        target.station.station.min_elevation_deg,
-    )
-    for coming in passes:
+    soon_tai_s, last_tai_s = now_tai_s + SOON_S, now_tai_s + NEXT_PASS_DAYS * DAY_S
+    early = _passes_until(target, now_tai_s, soon_tai_s)
+    found = [one for one in early if now_tai_s < one.set_tai_s < soon_tai_s]
+    for coming in found or _passes_until(target, now_tai_s, last_tai_s):
         if coming.set_tai_s > now_tai_s:
             if lacking := not_covered(target, coming, now_tai_s):
                 raise UsageError(lacking)
             return coming
-    until = ending(target, now_tai_s + NEXT_PASS_DAYS * DAY_S)
+    until = ending(target, last_tai_s)
     raise UsageError(
         f"no pass of {target.elements.label} over {target.station.station.name} above "
         f"{target.station.station.min_elevation_deg:g} deg within {NEXT_PASS_DAYS:g} days of {utc_text(now_tai_s, 0)}"
         + (until and f"; {until}")
     )
+
+
+def _passes_until(target: Target, now_tai_s: float, end_tai_s: float) -> list[Pass]:
+    lowest_deg = target.station.station.min_elevation_deg
+    return find_passes(target.elements.propagator, target.station.site, now_tai_s, end_tai_s, lowest_deg)
 
 
 def ending(target: Target, end_tai_s: float) -> str:
