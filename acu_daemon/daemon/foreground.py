@@ -105,16 +105,26 @@ class Foreground:
         end_tai_s, begun_tai_s = due_tai_s + HURRY_SHARE * self._config.period_s, due_tai_s
         while (
             self._area.state.stage is not Stage.READY
-            and self._seen.extra is not None
-            and not isinstance(self._seen.extra.reply, Nak | None)
+            and self._has_news()
             and self._port.is_up
             and not self._port.must_poll
-            and 2.0 * self._clock.tai_s() - begun_tai_s < end_tai_s
+            and self._next_answer_tai_s(begun_tai_s) < end_tai_s
         ):
             begun_tai_s = self._clock.tai_s()
             self._after_tick()  # a refused rehearsal ends before the first write
             await self._port.idle_gap()
             await self._tick()
+
+    def _has_news(self) -> bool:
+        """Whether the start can go on: its last question is answered, or the first status of all has come."""
+        if self._seen.extra is None:
+            return self._seen.status is not None and self._area.state.status is None
+        return not isinstance(self._seen.extra.reply, Nak | None)
+
+    def _next_answer_tai_s(self, begun_tai_s: float) -> float:
+        """When the next exchange would be over: it takes as long as the last one; an identity may be twice as long."""
+        now_tai_s = self._clock.tai_s()
+        return now_tai_s + (1.0 if self._seen.extra is not None else 2.0) * (now_tai_s - begun_tai_s)
 
     async def _tick(self) -> None:
         port, area = self._port, self._area
