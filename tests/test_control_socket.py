@@ -62,6 +62,18 @@ async def test_two_daemons_do_not_share_a_state_directory(tmp_path: Path) -> Non
     await channel.close()
 
 
+async def test_a_daemon_without_its_socket_has_the_directory_still(tmp_path: Path) -> None:
+    """As in the instant in which two of them start, when neither listens yet."""
+    channel = ControlSocket(tmp_path, answer)
+    await channel.open()
+    (tmp_path / SOCKET).unlink()
+    with pytest.raises(UsageError, match="another daemon runs with this state directory"):
+        await ControlSocket(tmp_path, answer).open()
+    await channel.close()
+    await channel.open()
+    await channel.close()
+
+
 async def test_a_path_too_long_for_an_address_works_too(tmp_path: Path) -> None:
     deep = tmp_path / ("d" * 60) / ("e" * 60)
     deep.mkdir(parents=True)

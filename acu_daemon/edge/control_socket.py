@@ -5,6 +5,7 @@ The daemon answers `ok ...` or `error ...`.  Whoever may write to the socket may
 
 import asyncio
 import contextlib
+import fcntl
 import os
 import socket
 from collections.abc import Callable, Iterator
@@ -27,12 +28,18 @@ class ControlSocket:
         self._directory = directory
         self._answer = answer
         self._server: asyncio.Server | None = None
+        self._lock = -1
         self._client_count = 0
 
     async def open(self) -> None:
         """Begin to listen.  UsageError: another daemon runs with this state directory, or it takes no socket."""
-        listener = _listen(self._directory)
-        self._server = await asyncio.start_unix_server(self._serve, sock=listener, limit=LONGEST_LINE)
+        self._lock = _lock(self._directory)
+        try:
+            listener = _listen(self._directory)
+            self._server = await asyncio.start_unix_server(self._serve, sock=listener, limit=LONGEST_LINE)
+        except BaseException:
+            os.close(self._lock)
+            raise
 
     async def close(self) -> None:
         """Stop listening and take the socket away."""
@@ -40,6 +47,7 @@ class ControlSocket:
             self._server.close()
             self._server = None
             (self._directory / SOCKET).unlink(missing_ok=True)
+            os.close(self._lock)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._client_count += 1
@@ -107,10 +115,24 @@ def _address(directory: Path) -> Iterator[str]:
         os.close(descriptor)
 
 
+def _lock(directory: Path) -> int:
+    """Take the directory for this process alone, until the descriptor is closed, be it by SIGKILL.  UsageError."""
+    try:
+        descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    except OSError as error:
+        raise UsageError(f"{directory}: {error.strerror}; choose another place with --state DIR") from None
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(descriptor)
+        raise UsageError(
+            f"{directory}: another daemon runs with this state directory; give each its own --state DIR"
+        ) from None
+    return descriptor
+
+
 def _listen(directory: Path) -> socket.socket:
     path = directory / SOCKET
-    if _is_alive(directory):
-        raise UsageError(f"{path}: another daemon runs with this state directory; give each its own --state DIR")
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         path.unlink(missing_ok=True)
@@ -126,13 +148,3 @@ def _listen(directory: Path) -> socket.socket:
         listener.close()
         raise UsageError(f"{path}: cannot be made: {error.strerror}; choose another place with --state DIR") from None
     return listener
-
-
-def _is_alive(directory: Path) -> bool:
-    """Whether somebody listens; a socket that a killed daemon left does not count."""
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe, contextlib.suppress(OSError):
-        probe.settimeout(ANSWER_S)
-        with _address(directory) as address:
-            probe.connect(address)
-        return True
-    return False
