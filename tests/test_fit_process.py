@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import made_orbits
 import numpy as np
@@ -121,6 +122,21 @@ async def test_a_hung_child_is_ended_and_replaced() -> None:
     assert reply.fit is not None
     assert reply.fit.reading_count == 30
     assert runner.start_count == 2
+
+
+async def test_a_child_that_talks_nonsense_is_ended_and_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nonsense = tmp_path / "nonsense"
+    nonsense.write_text("#!/bin/sh\nprintf '\\012\\0\\0\\0\\0\\0\\0\\0no pickle.'\nexec sleep 1000\n")
+    nonsense.chmod(0o755)
+    runner = ProcessFitRunner(setup(), PATIENT_S)
+    with monkeypatch.context() as other:
+        other.setattr(sys, "executable", str(nonsense))
+        assert "its answer makes no sense" in await failure(runner, request(0))
+    assert runner.pid is None
+    assert (await runner.refit(request(1))).fit is not None
+    await runner.close()
 
 
 async def test_a_starting_child_has_more_time_than_an_answer() -> None:

@@ -119,7 +119,11 @@ class ProcessFitRunner:
         if self._child is None or self._child.stdout is None:
             raise OSError("no child")
         (size,) = LENGTH.unpack(await self._child.stdout.readexactly(LENGTH.size))
-        return pickle.loads(await self._child.stdout.readexactly(size))
+        data = await self._child.stdout.readexactly(size)
+        try:
+            return pickle.loads(data)
+        except Exception as error:  # noqa: BLE001  of bytes that are no pickle anything may come
+            raise OSError(f"its answer makes no sense: {error}") from None
 
     async def close(self) -> None:
         """End the child."""
