@@ -59,6 +59,12 @@ def test_on_a_terminal_a_line_is_for_people(capsys: pytest.CaptureFixture[str]) 
     assert line.endswith("REHEARSAL")
 
 
+def test_a_name_gives_a_terminal_no_orders_and_makes_no_second_line(capsys: pytest.CaptureFixture[str]) -> None:
+    configure(is_terminal=True).info("run.start", satellite="NOAA\x1b[2J\n00:00:00.0 !! stop.done")
+    (line,) = lines(capsys)
+    assert "satellite=NOAA\\x1b[2J\\n00:00:00.0 !! stop.done" in line
+
+
 def test_the_live_line_is_cleared_before_each_line(capsys: pytest.CaptureFixture[str]) -> None:
     cleared: list[int] = []
     log = configure(is_terminal=True, before_line=lambda: cleared.append(1))

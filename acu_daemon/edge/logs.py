@@ -87,4 +87,6 @@ def _readable(level: str, entry: Entry) -> str:
 
 
 def _short(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    """What a terminal takes for an order, such as in the name of a satellite, is shown and not obeyed."""
+    text = f"{value:.4g}" if isinstance(value, float) else str(value)
+    return text if text.isprintable() else repr(text)[1:-1]
