@@ -64,6 +64,33 @@ def test_a_bad_azimuth_is_refused_with_a_reason_and_the_last_good_value_stays(ba
     assert passed.az.position_deg == pytest.approx(100.0, abs=RATE_TOLERANCE_DEG)
 
 
+BEYOND_DEG = LIMIT_SLACK_DEG + 0.001
+
+
+@pytest.mark.parametrize("is_followed", [True, False])
+@pytest.mark.parametrize(
+    ("az_deg", "el_deg", "outside"),
+    [
+        (270.0, 90.0, ""),
+        (-270.0, 0.0, ""),
+        (270.0 + LIMIT_SLACK_DEG, 90.0 + LIMIT_SLACK_DEG, ""),
+        (-270.0 - LIMIT_SLACK_DEG, -LIMIT_SLACK_DEG, ""),
+        (270.0 + BEYOND_DEG, 45.0, "azimuth"),
+        (-270.0 - BEYOND_DEG, 45.0, "azimuth"),
+        (100.0, 90.0 + BEYOND_DEG, "elevation"),
+        (100.0, -BEYOND_DEG, "elevation"),
+    ],
+)
+def test_p5_the_limit_and_a_readings_noise_beyond_it_pass_as_the_limit_and_more_is_refused(
+    az_deg: float, el_deg: float, outside: str, is_followed: bool
+) -> None:
+    state = at(min(max(az_deg, -270.0), 270.0), min(max(el_deg, 0.0), 90.0))
+    passed = gate(Pointing(az_deg, el_deg, 0.0, 0.0), state, 0.0, is_followed=is_followed, dt_s=DT_S, config=CONFIG)
+    assert passed.refusal.startswith(outside) and bool(passed.refusal) is bool(outside)
+    assert -270.0 <= passed.az.position_deg <= 270.0
+    assert 0.0 <= passed.el.position_deg <= 90.0
+
+
 def test_p5_a_followed_register_that_stood_through_a_refusal_begins_again_from_a_standstill():
     state = at(100.0, 45.0, az_rate=5.0, el_rate=3.0)
     passed = gate(Pointing(nan, 45.3, 5.0, 3.0), state, 0.0, is_followed=True, dt_s=DT_S, config=CONFIG)

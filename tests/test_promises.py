@@ -179,7 +179,8 @@ class Promises(RuleBasedStateMachine):
         if rig.clock.tai_s() < rig.coming.set_tai_s - 60.0:
             order_count, track = rig.judge.order_count - before, rig.state.track
             assert order_count >= 9, f"{order_count} orders in a second, {track}, {rig.state}"
-            assert track in SERVING, track
+            is_waiting = track == "ACQUIRE/TLE" and rig.service._area.sky.fit is None  # on the path of the elements
+            assert track in SERVING or is_waiting, track
 
 
 TestPromises = Promises.TestCase
