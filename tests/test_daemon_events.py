@@ -410,6 +410,29 @@ def test_a_rehearsal_refuses_a_real_acu_before_anything_is_written() -> None:
     assert not any(isinstance(command, Stop) for command in Real.heard)
 
 
+class Mumbling(FakeAcu):
+    """Its first identities arrive garbled."""
+
+    said: list[Identity]
+
+    def answer(self, command: Command) -> Reply:
+        return self.said.pop(0) if self.said and isinstance(command, Identify) else super().answer(command)
+
+
+@pytest.mark.parametrize("garbled", [("3842", "Q1"), ("1842", "S1"), ("3842", "1S"), ("3802", "10")])
+def test_a_rehearsal_asks_again_when_the_identity_is_garbled(garbled: tuple[str, str]) -> None:
+    Mumbling.said = [Identity(*garbled)]
+    flight = climb(10.0, make_acu=Mumbling)
+    assert len(events_named(flight, "acu.identity_doubted")) == 1
+    assert state_at(flight, T + 10.0) == "AUTOTRACK/FITTED"
+
+
+def test_a_rehearsal_refuses_what_twice_says_it_is_another_acu() -> None:
+    Mumbling.said = [Identity("3862", "30"), Identity("3862", "30")]
+    with pytest.raises(UsageError, match="3862"):
+        climb(10.0, make_acu=Mumbling)
+
+
 @pytest.mark.parametrize("at_s", [15.03, 15.005], ids=["between two exchanges", "within one"])
 @pytest.mark.parametrize("losses", [[], [(12.0, 30.0)]], ids=["tracking", "lost"])
 def test_a_stop_in_mid_pass_leaves_the_acu_in_standby(losses: list[tuple[float, float]], at_s: float) -> None:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from acu_daemon.control.hands import last_command
 from acu_daemon.control.start import after_reply, next_command
 from acu_daemon.control.state import ControlConfig, ControlState, Exchange, Stage
 from acu_daemon.model import AxisLimits
@@ -21,6 +22,7 @@ from acu_daemon.protocol.messages import (
     Registers,
     Reply,
     Status,
+    Stop,
     WriteParameter,
     WriteRegisters,
 )
@@ -202,3 +204,25 @@ def test_a_reply_to_another_question_moves_nothing() -> None:
 
 def test_when_it_is_ready_it_asks_for_nothing() -> None:
     assert next_command(replace(standing(), stage=Stage.READY), CONFIG) is None
+
+
+LATCHED = ControlState(latch="azimuth stands still away from its command", is_stop_due=True)
+
+
+@pytest.mark.parametrize(
+    ("identities", "stage"),
+    [
+        (["S1"], Stage.IDENTIFIED),
+        (["10"], Stage.NEW),
+        (["S9"], Stage.NEW),
+        (["S9", "S9"], Stage.IDENTIFIED),
+        (["S9", "10"], Stage.NEW),
+        (["10", "10"], Stage.NEW),
+    ],
+)
+def test_a_rehearsal_gets_on_only_with_an_acu_that_surely_is_simulated(identities: list[str], stage: Stage) -> None:
+    state, config = LATCHED, replace(CONFIG, is_rehearsal=True)
+    for variant in identities:
+        state = after_reply(state, Exchange(Identify(), Identity("3842", variant)), config, [])
+    assert state.stage is stage
+    assert last_command(replace(state, status=status()), config) == (Stop() if stage is Stage.IDENTIFIED else None)

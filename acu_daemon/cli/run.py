@@ -163,7 +163,7 @@ def make_job(
             station.acu.azimuth.limits(),
             carried=carried,
         ),
-        control=control_config(station, target.satellite, link.byte_time_s),
+        control=replace(control_config(station, target.satellite, link.byte_time_s), is_rehearsal=is_rehearsal),
         coming=coming,
         horizon_s=station.tracking.horizon_s,
         low_water_s=station.tracking.low_water_s,

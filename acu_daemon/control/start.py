@@ -77,8 +77,8 @@ def after_reply(state: ControlState, extra: Exchange, config: ControlConfig, eve
             return _after_watchdog(state, extra, config, events, is_refused=is_refused)
         case (Stage.READY, SelectBackup(), Ack()) if state.watchdog is Watchdog.SET:
             return replace(state, watchdog=Watchdog.UNKNOWN)  # a backup to select may come from a power cycle
-        case (Stage.NEW, Identify(), Identity()):
-            return replace(state, stage=Stage.IDENTIFIED)
+        case (Stage.NEW, Identify(), Identity() as identity):
+            return _identified(state, identity, config, events)
         case (Stage.IDENTIFIED, ReadRegisters(), Registers(tilt_code=tilt_code)):
             return replace(state, stage=Stage.REGISTERS_KNOWN, tilt_code=tilt_code)
         case (Stage.REGISTERS_KNOWN, ReadParameter("S"), Parameter(code=0)) | (
@@ -96,6 +96,16 @@ def after_reply(state: ControlState, extra: Exchange, config: ControlConfig, eve
         case (Stage.PRESENT_WRITTEN, ReadRegisters(), Registers() as read):
             return replace(state, stage=Stage.READY if _matches(state, read) else Stage.SECTOR_FREE)
     return state
+
+
+def _identified(state: ControlState, identity: Identity, config: ControlConfig, events: list[Event]) -> ControlState:
+    """One that nobody knows may be a garbled one: it is asked again.  A rehearsal on a real ACU gets no further."""
+    is_sure = identity.is_known or identity == state.identity
+    if not is_sure:
+        events.append(Event("acu.identity_doubted", {"identity": str(identity)}, is_warning=True))
+    may_go_on = is_sure and (identity.is_simulated or not config.is_rehearsal)
+    stage = Stage.IDENTIFIED if may_go_on else Stage.NEW
+    return replace(state, stage=stage, identity=identity, is_identity_sure=is_sure)
 
 
 def _perhaps_set(state: ControlState, config: ControlConfig) -> Watchdog:

@@ -11,7 +11,7 @@ from acu_daemon.control.lag import LagEstimate
 from acu_daemon.control.states import TrackState
 from acu_daemon.model import AxisLimits, FitResult, Prediction, Reading
 from acu_daemon.pointing.axis import AxisState
-from acu_daemon.protocol.messages import Command, Nak, Reply, Status
+from acu_daemon.protocol.messages import Command, Identity, Nak, Reply, Status
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +35,7 @@ class ControlConfig:
     search_across_deg: float = 2.0
     is_armed: bool = True  # at the start; later as people arm and disarm
     is_shadow: bool = False  # commands nothing, whatever happens
+    is_rehearsal: bool = False  # commands nothing but an ACU that says it is simulated
     register_watchdog_s: float = 0.0  # the ACU's parameter W; 0: it is not touched
     following: Bounds = Bounds()
     clock_alarm_deg: float = 0.1  # an error of UTC counts from here on, at the sky's present rate
@@ -90,6 +91,8 @@ class ControlState:
     track: TrackState = TrackState.LINK_LOST
     entered_tai_s: float = -inf
     stage: Stage = Stage.NEW
+    identity: Identity | None = None  # as the ACU said it last
+    is_identity_sure: bool = False  # a known one, or said twice
     tilt_code: int = 0
     present_deg: tuple[float, float] | None = None  # the first register write of this start, to be read back
     status: Status | None = None

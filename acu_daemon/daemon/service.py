@@ -94,7 +94,8 @@ class Service:
         self._ticked = asyncio.Event()
         self._stop_reason = ""
         self._log: Any = structlog.get_logger("pass")
-        self._area = CommonArea(state=job.state)
+        is_stop_due = job.state.is_stop_due and job.state.is_armed(job.control)  # else the antenna is not ours
+        self._area = CommonArea(state=replace(job.state, is_stop_due=is_stop_due))
         self._port = AcuPort(link, clock, job.address, job.control.period_s, job.device_delay_s)
         self._background = Background(
             self._area,
@@ -168,8 +169,8 @@ class Service:
         if self._area.state.status is None and elapsed_s > FIRST_POLL_S:
             why = self._port.problem or "no answer"
             raise NoAcuError(f"no good poll within {FIRST_POLL_S:g} s: {why}")
-        identity = self._foreground.identity
-        if self._job.is_rehearsal and identity is not None and not identity.is_simulated:
+        identity, is_sure = self._area.state.identity, self._area.state.is_identity_sure
+        if self._job.is_rehearsal and identity is not None and is_sure and not identity.is_simulated:
             raise UsageError(
                 f"the ACU is a real one ({identity}): a rehearsal (--at) runs only on a simulated ACU; leave out --at"
             )

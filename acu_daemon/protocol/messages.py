@@ -200,6 +200,11 @@ class Identity:
     variant: str
 
     @property
+    def is_known(self) -> bool:
+        """Whether the ICD names it; two characters that changed alike never make a simulated one of a real one."""
+        return self.model == "3842" and self.variant in ("10", "20", "S1", "S2")
+
+    @property
     def is_simulated(self) -> bool:
         return self.variant.startswith("S")
 
