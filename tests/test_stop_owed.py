@@ -1,13 +1,16 @@
 """P1, P6: a STOP that is owed, and the end of the watchdog, are not lost by another word, a refusal or the end."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from flights import RISING_TAI_S, climb, commands_between
+from promise_rig import Rig, demo_scene
 from test_hands import GUARDED, latched, moving
 from test_tick import FITTED, NOW, SKY, saw, status
 
 from acu_daemon.cli.virtual_pass import Stage as Rigged
+from acu_daemon.control.fence import READS
 from acu_daemon.control.state import ControlState, Exchange, Observation, Request, Stage
 from acu_daemon.control.tick import tick
 from acu_daemon.protocol.messages import AcuMode, Command, Nak, Reply, Status, Stop, WriteParameter
@@ -100,3 +103,37 @@ def test_disarmed_and_stopped_it_ends_at_once_though_the_link_is_down() -> None:
     assert flight.outcome is not None
     assert flight.outcome.is_stopped
     assert flight.rows[-1].tai_s < T + 18.0
+
+
+# Of the daemon before
+
+
+@pytest.mark.parametrize("is_armed", [True, False], ids=["arm = auto", "arm = manual"])
+def test_p1_a_latch_of_the_last_run_is_stopped_where_the_daemon_is_armed_and_else_nothing_is_sent(
+    tmp_path: Path, is_armed: bool
+) -> None:
+    (tmp_path / "latch").write_text("azimuth moves away from its command\n2026-08-18T01:00:00Z\n")
+    sent: list[Command] = []
+    with Rig(tmp_path, demo_scene(), is_armed=is_armed) as rig:
+        judge_sent = rig.judge.sent
+        rig.judge.sent = lambda command: (sent.append(command), judge_sent(command))[1]  # type: ignore[method-assign]
+        rig.wait(2.0)
+        rig.end_and_run_again()
+        rig.wait(1.0)
+    orders = [command for command in sent if not isinstance(command, READS)]
+    assert set(orders) == ({Stop()} if is_armed else set())
+
+
+@pytest.mark.parametrize("after_s", [0.001, 0.15, 0.4])
+def test_p4_started_again_after_a_crash_and_ended_at_once_it_says_no_stop_that_did_not_happen(
+    tmp_path: Path, after_s: float
+) -> None:
+    with Rig(tmp_path, demo_scene()) as rig:
+        rig.wait(6.0)
+        assert rig.acu.status().mode is AcuMode.AUTOTRACK
+        rig.crash(0.0)
+        rig.wait(after_s)
+        service, task = rig.service, rig.task
+        rig.end_and_run_again()
+        assert rig.service is not service
+        assert task.result().is_stopped is (rig.acu.status().mode is AcuMode.STANDBY)

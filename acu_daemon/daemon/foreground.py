@@ -226,9 +226,10 @@ class Foreground:
 
     @property
     def owes_stop(self) -> bool:
-        """Whether the antenna obeys us, or a STOP for it was not acknowledged yet."""
+        """Whether the antenna obeys us, or who was killed before us, or a STOP for it was not acknowledged yet."""
         state = self._area.state
-        return state.is_stop_due or (self.write_count > 0 and state.is_armed(self._config))
+        is_held = self.write_count > 0 or state.held is not None
+        return state.is_stop_due or (is_held and state.is_armed(self._config))
 
     async def safe_stop(self) -> bool:
         """Stop the antenna.  True: stopped, or left to somebody else; False: nobody knows."""
