@@ -1,7 +1,8 @@
 """Recorded readings: what is written can be read, and every bad line is told by its number."""
 
+import errno
+import os
 import resource
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from structlog.testing import capture_logs
+from test_writer import stuck
 
 from acu_daemon.edge.recording import RecordingWriter, read_readings
 from acu_daemon.edge.writer import Writer
@@ -195,14 +197,34 @@ def test_beside_the_loop_every_line_is_in_the_file_once_the_writer_has_ended(tmp
     assert seconds_in(path) == list(range(100, 200))
 
 
+def test_p10_a_disk_without_room_for_another_file_keeps_no_run_from_its_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "x.csv"
+
+    def full(*_: Any) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with capture_logs() as logs:
+        with monkeypatch.context() as disk:
+            disk.setattr(os, "open", full)
+            recording = RecordingWriter(path)
+            recording.add(Reading(100.0, 1.0, 2.0, True))
+            assert recording.problem == "x.csv: No space left on device"
+        recording.add(Reading(101.0, 1.0, 2.0, True))
+        recording.close()
+    assert seconds_in(path) == [101.0]
+    assert [log["event"] for log in logs] == ["record.failed", "record.resumed"]
+
+
 def test_p10_a_disk_that_does_not_keep_up_is_told_once(tmp_path: Path) -> None:
-    path, writer, go = tmp_path / "x.csv", Writer("files", limit=5), threading.Event()
-    writer.put(go.wait)
+    path, writer = tmp_path / "x.csv", Writer("files", limit=5)
+    job = stuck(writer)
     with capture_logs() as logs, RecordingWriter(path, writer) as recording:
         for second in range(100, 120):
             recording.add(Reading(second, 1.0, 2.0, True))
         assert recording.problem == "x.csv: the disk does not keep up"
-        go.set()
+        job.go.set()
     assert writer.close(60.0)
     assert logs[0]["event"] == "record.failed"
     assert seconds_in(path)[0] == 100.0

@@ -1,6 +1,7 @@
 """Readings CSV: written by `run --record`, read by `replay` (design section 8)."""
 
 import contextlib
+import errno
 import math
 import os
 import stat
@@ -32,29 +33,40 @@ class RecordingWriter:
     """
 
     def __init__(self, path: Path, writer: Writer | None = None, now_tai_s: float = math.inf) -> None:
-        """Open the file.  UsageError: it cannot be, or holds something else, or readings later than now_tai_s."""
+        """Open the file.  UsageError: it cannot be, or holds something else, or readings later than now_tai_s.
+
+        Where the disk has no room for another file, the first reading tries again.
+        """
         self._path = path
         self._writer = writer
+        self._fd = -1
+        self._is_file = True
+        self._last_us = self._synced_tai_s = -math.inf
+        self._lost_count = 0
+        self._failure = ""
+        self._has_header = False
+        self._log: Any = structlog.get_logger("record")
         try:
-            self._fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
+            self._open()
         except OSError as error:
-            raise UsageError(f"--record {path}: {error.strerror}") from None
+            if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+                raise UsageError(f"--record {path}: {error.strerror}") from None
+            return
         try:
-            self._is_file = stat.S_ISREG(os.fstat(self._fd).st_mode)
             last_tai_s = self._continue(now_tai_s) if self._is_file else None
         except BaseException:
             os.close(self._fd)
             raise
         self._last_us = -math.inf if last_tai_s is None else round(last_tai_s * 1e6)
-        self._synced_tai_s = -math.inf
-        self._lost_count = 0
-        self._failure = ""
         self._has_header = self._is_file and os.fstat(self._fd).st_size > 0
-        self._log: Any = structlog.get_logger("record")
         if not self._has_header:
             with contextlib.suppress(OSError):  # the first reading tries again
                 self._append(_HEADER_LINE)
                 self._has_header = True
+
+    def _open(self) -> None:
+        self._fd = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
+        self._is_file = stat.S_ISREG(os.fstat(self._fd).st_mode)
 
     @property
     def problem(self) -> str:
@@ -97,6 +109,8 @@ class RecordingWriter:
     def _append(self, text: str) -> None:
         """Append whole lines, or nothing.  OSError: nothing."""
         data = text.encode("ascii")
+        if self._fd < 0:
+            self._open()
         size = os.fstat(self._fd).st_size
         try:
             while data:  # after a part of it, the next one says why
@@ -148,6 +162,8 @@ class RecordingWriter:
             self._writer.put(self._close)
 
     def _close(self) -> None:
+        if self._fd < 0:
+            return
         with contextlib.suppress(OSError):  # of a failed recording
             self._sync()
         os.close(self._fd)
