@@ -6,6 +6,7 @@ Shared by scripts/bench_pass.py and the tests of the real processes.
 import contextlib
 import json
 import math
+import os
 import shutil
 import signal
 import subprocess
@@ -33,6 +34,7 @@ LEAD_S = 4.0  # both processes need this long to start
 STARTS = 4.0  # and on a busy machine this many times what one start takes
 BEFORE_RISE_S = 30.0  # a whole pass begins this long before the rise
 SAY_EVERY_S = 5.0
+HARDWARE_NICENESS = -10  # of what stands for hardware, where permitted: a real ACU does not share the host's processor
 
 SCENARIO = """\
 [sky]
@@ -67,8 +69,11 @@ class Scene:
     is_window: bool
 
 
-def make_scene(directory: Path, pass_name: str | None, window_s: float | None) -> Scene:
-    """Write the files of a bench.  pass_name: of ../shared/data/passes; None: the demo's satellite."""
+def make_scene(directory: Path, pass_name: str | None, window_s: float | None, at_share: float = 0.5) -> Scene:
+    """Write the files of a bench.  pass_name: of ../shared/data/passes; None: the demo's satellite.
+
+    at_share: where in the pass the window lies, from 0, at its begin, to 1, at its end.
+    """
     config = directory / "config"
     if pass_name is None:
         truth, sky = None, {"along_track_s": 0.9, "delta_raan_deg": 0.015}
@@ -82,7 +87,7 @@ def make_scene(directory: Path, pass_name: str | None, window_s: float | None) -
     span_s = coming.set_tai_s - coming.rise_tai_s
     start_tai_s, end_tai_s = coming.rise_tai_s, coming.set_tai_s
     if window_s is not None and window_s < span_s:
-        start_tai_s += (span_s - window_s) / 2
+        start_tai_s += (span_s - window_s) * at_share
         end_tai_s = start_tai_s + window_s
     from_tai_s, to_tai_s = (start_tai_s + part * (end_tai_s - start_tai_s) for part in (LOSS_FROM, LOSS_TO))
     limits = target.station.acu.azimuth.limits()
@@ -170,6 +175,7 @@ class Rig:
             self.acu = subprocess.Popen(
                 [*self.arguments("fake-acu"), *where, *files, *more], stdout=subprocess.PIPE, stderr=errors, text=True
             )
+        keep_time_of(self.acu.pid)
         said = self.acu.stdout.readline() if self.acu.stdout else ""
         if not said.startswith("listening "):
             raise BenchError(f"the simulated ACU did not start: {(self.directory / 'acu.err').read_text()}")
@@ -208,6 +214,12 @@ class Rig:
                 process.wait()
             if process.stdout is not None:
                 process.stdout.close()
+
+
+def keep_time_of(pid: int) -> None:
+    """Let a process that stands for hardware run before the others of this machine, where that is permitted."""
+    with contextlib.suppress(PermissionError):
+        os.setpriority(os.PRIO_PROCESS, pid, HARDWARE_NICENESS)
 
 
 @contextlib.contextmanager
