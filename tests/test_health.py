@@ -1,0 +1,56 @@
+"""What feeds the service's watchdog, and what does not (P4): work done, never a loop that only turns."""
+
+from dataclasses import replace
+
+from test_live_line import SEEN
+
+from acu_daemon.daemon.health import FEED_S, Health
+from acu_daemon.daemon.snapshot import Snapshot
+
+ALIVE = "WATCHDOG=1"
+
+
+def told(*seen: Snapshot) -> list[str]:
+    """What systemd hears of these snapshots, the lines of status left out."""
+    heard: list[str] = []
+    health = Health(heard.append)
+    for one in seen:
+        health.see(one)
+    return [text for text in heard if not text.startswith("STATUS=")]
+
+
+def ticks(count: int, **per_tick: int) -> list[Snapshot]:
+    """Snapshots 0.1 s apart in which counts rise by so much each."""
+    rises = {"tick_count": 1, **per_tick}
+    return [
+        replace(
+            SEEN, tai_s=SEEN.tai_s + 0.1 * k, **{name: getattr(SEEN, name) + k * rise for name, rise in rises.items()}
+        )
+        for k in range(1, count + 1)
+    ]
+
+
+def test_it_is_ready_once_when_the_acu_has_told_where_the_antenna_is() -> None:
+    unknown = replace(SEEN, az_deg=None, el_deg=None)
+    assert told(unknown) == []
+    assert told(unknown, SEEN, *ticks(30)) == ["READY=1"]
+
+
+def test_p4_answered_exchanges_feed_the_watchdog_twice_a_second() -> None:
+    fed = told(*ticks(50, answered_count=1)).count(ALIVE)
+    assert fed == round(5.0 / FEED_S)
+
+
+def test_p4_a_loop_that_turns_without_an_answered_exchange_starves_the_watchdog() -> None:
+    served = ticks(20, answered_count=1)
+    turning = [replace(served[-1], tai_s=served[-1].tai_s + 0.1 * k, tick_count=120 + k) for k in range(1, 60)]
+    fed_count = told(*served).count(ALIVE)
+    assert fed_count == 4
+    assert told(*served, *turning).count(ALIVE) <= fed_count + 1  # what was answered since it was fed last
+
+
+def test_p4_with_the_link_down_each_attempt_to_open_it_feeds_the_watchdog_and_nothing_else_does() -> None:
+    down = [replace(one, is_link_up=False) for one in ticks(30)]
+    tried = [replace(one, attempt_count=k // 10) for k, one in enumerate(down)]
+    assert told(*down).count(ALIVE) == 0
+    assert told(*tried).count(ALIVE) == 2
