@@ -1,7 +1,10 @@
 """Faults of the line and of the machine on the real commands as processes: two antennas at once, one on TCP behind the
 fault proxy, one on a pseudo terminal behind a by-id link.
 
-Asserts what happened and counts, never speed: the machine may be busy.
+Asserts what happened and counts, never speed: the machine may be busy.  The satellite climbs at 0.2 deg/s meanwhile:
+0.1 deg asks for an orbit and a lag that are right, and for registers no older than half a second, not for an idle
+machine.  What stands for hardware, the simulated ACU and the proxy, runs before all others where that is permitted: a
+real ACU is not starved by the loads that starve the daemon.
 """
 
 import os
@@ -20,14 +23,17 @@ import numpy as np
 import pytest
 from script_modules import load
 
-from acu_daemon.orbit.timescales import tai_from_utc
+from acu_daemon.model import sky_angle_deg
 from acu_daemon.report.trace import Trace, read_trace
+from acu_daemon.report.wire import HALF_SERVO_TICK_S, Writes, read_writes, satellite_at
+from acu_daemon.units import Array
 
 pass_rig = load("pass_rig")
 pytestmark = pytest.mark.realtime
 
 PATIENCE_S = 60.0  # a hang fails the test; a slow machine does not
-IN_BEAM_DEG = 0.25  # half of half the beam: the fit has had 8 s of readings only, and the machine is overloaded
+ASKED_DEG = 0.1
+CLIMB_SHARE = 0.25  # of the pass: 20 to 25 deg high
 BACK_S = 7.0  # to be on the path again, on a busy machine
 BURST_S, BURST_COUNT = 0.1, 3  # so many register writes in so short a time are a burst: a late tick may halve a period
 BUSY = "while True: pass"
@@ -40,7 +46,7 @@ class Story:
     log: str = ""
     problems: list[str] = field(default_factory=list)
     trace: Trace | None = None
-    writes_tai_s: list[float] = field(default_factory=list)
+    writes: Writes | None = None
     devices: list[Path] = field(default_factory=list)
     marks_tai_s: dict[str, float] = field(default_factory=dict)
 
@@ -107,8 +113,7 @@ def end(rig: Any, control: str, story: Story, seen: int) -> None:
     assert rig.daemon.wait(PATIENCE_S) == 0
     rig.stop()
     story.log, story.trace = rig.log.read_text(), read_trace(rig.trace)
-    lines = rig.wire_log.read_text().splitlines()[1:]
-    story.writes_tai_s = [tai_from_utc(line.split(",")[0]) for line in lines]
+    story.writes = read_writes(rig.wire_log)
 
 
 def unplug(rig: Any) -> Story:
@@ -134,6 +139,7 @@ def half_open_and_freeze(rig: Any) -> Story:
     proxy = subprocess.Popen(
         [*pass_rig.ACU_DAEMON, *arguments, "--control", "127.0.0.1:0"], stdout=subprocess.PIPE, text=True
     )
+    pass_rig.keep_time_of(proxy.pid)
     busy: list[subprocess.Popen[bytes]] = []
     try:
         assert proxy.stdout is not None
@@ -167,7 +173,7 @@ def half_open_and_freeze(rig: Any) -> Story:
 @pytest.fixture(scope="module")
 def stories(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, "Future[Story]"]]:
     """Both antennas at once."""
-    scene = pass_rig.make_scene(tmp_path_factory.mktemp("scene"), None, 150.0)
+    scene = pass_rig.make_scene(tmp_path_factory.mktemp("scene"), None, 150.0, CLIMB_SHARE)
     directory = tmp_path_factory.mktemp("rigs")
     with pass_rig.rigs(scene, ["tcp", "pty"], directory) as (tcp, pty), ThreadPoolExecutor(2) as pool:
         for rig in (tcp, pty):
@@ -177,20 +183,44 @@ def stories(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, "Fut
         yield {"tcp": pool.submit(half_open_and_freeze, tcp), "pty": pool.submit(unplug, pty)}
 
 
-def worst_error_deg(story: Story, from_tai_s: float, to_tai_s: float) -> float:
-    trace = story.trace
+def times_of_writes(story: Story) -> Array:
+    assert story.writes is not None
+    return story.writes.tai_s
+
+
+def worst_error_deg(story: Story) -> float:
+    """The beam's, in the second and a half before the signal is back."""
+    trace, marks = story.trace, story.marks_tai_s
     assert trace is not None
-    chosen = (trace.tai_s >= from_tai_s) & (trace.tai_s <= to_tai_s)
-    return float(np.max(trace.error_deg[chosen]))
+    is_held = (trace.tai_s >= marks["held"]) & (trace.tai_s <= marks["signal"])
+    return float(np.max(trace.error_deg[is_held]))
+
+
+def worst_register_deg(story: Story) -> float:
+    """Of the registers against the satellite as they take effect, in the same time: the daemon's own share of it."""
+    assert story.trace is not None
+    assert story.writes is not None
+    writes, marks = story.writes, story.marks_tai_s
+    is_held = (writes.tai_s >= marks["held"]) & (writes.tai_s <= marks["signal"])
+    assert is_held.any()
+    az_deg, el_deg = satellite_at(story.trace, writes.tai_s + HALF_SERVO_TICK_S)
+    columns = (writes.az_deg, writes.el_deg, az_deg, el_deg)
+    return max(sky_angle_deg(*aim) for aim in zip(*(column[is_held].tolist() for column in columns), strict=True))
 
 
 @pytest.mark.parametrize("link", ["tcp", "pty"])
 def test_p2_p3_the_antenna_is_held_after_faults_of_the_line_and_the_machine(
     stories: dict[str, "Future[Story]"], link: str
 ) -> None:
-    """P2, P3: on the path when the signal comes back; that it is tracked then, the story has waited for."""
+    """P2, P3: what the daemon writes and where the beam is when the signal comes back; 8 s of readings were all it had.
+
+    That the satellite is tracked then, the story has waited for.
+    """
     story = stories[link].result()
-    assert worst_error_deg(story, story.marks_tai_s["held"], story.marks_tai_s["signal"]) <= IN_BEAM_DEG
+    beam_deg, registers_deg = worst_error_deg(story), worst_register_deg(story)
+    print(f"{link}: beam error when the signal is back {beam_deg:.3f} deg, of the registers {registers_deg:.3f} deg")
+    assert beam_deg <= ASKED_DEG
+    assert registers_deg <= ASKED_DEG
 
 
 def test_p3_an_adapter_that_comes_back_under_another_name_is_found_behind_its_by_id_link(
@@ -207,7 +237,7 @@ def test_p3_an_adapter_that_comes_back_under_another_name_is_found_behind_its_by
 @pytest.mark.parametrize("link", ["tcp", "pty"])
 def test_p2_p8_nothing_is_ever_sent_in_a_burst(stories: dict[str, "Future[Story]"], link: str) -> None:
     """P2, P8: not after a connection that was half open, not after a daemon that stood still under load."""
-    times = np.array(stories[link].result().writes_tai_s)
+    times = times_of_writes(stories[link].result())
     spans = times[BURST_COUNT:] - times[:-BURST_COUNT]
     assert len(times) > 50
     assert float(np.min(spans)) > BURST_S
@@ -218,8 +248,7 @@ def test_p8_a_daemon_that_stood_still_for_two_seconds_counts_the_ticks_and_goes_
 ) -> None:
     """P8."""
     story = stories["tcp"].result()
-    marks = story.marks_tai_s
-    asleep = [t for t in story.writes_tai_s if marks["frozen"] + 0.2 < t < marks["awake"] - 0.2]
-    assert asleep == []
-    assert any(t > marks["awake"] for t in story.writes_tai_s)
+    marks, times = story.marks_tai_s, times_of_writes(story)
+    assert not ((times > marks["frozen"] + 0.2) & (times < marks["awake"] - 0.2)).any()
+    assert (times > marks["awake"]).any()
     assert '"skipped_tick_count": 0' not in story.log
