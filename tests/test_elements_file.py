@@ -1,6 +1,10 @@
 """From a satellite's TOML to a propagator: which file, which set of it, and what is said of bad ones."""
 
 import json
+import os
+import threading
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +41,7 @@ def load(directory: Path, satellite: str, elements: str | bytes = ISS, now: floa
     lists = directory / "lists"
     lists.mkdir(exist_ok=True)
     (lists / "active.txt").write_bytes(elements if isinstance(elements, bytes) else elements.encode())
+    os.utime(lists / "active.txt", (0.0, 0.0))  # nobody is writing it
     section, _ = load_satellite(directory, "sat", load_station(directory))
     return load_elements(section, directory / "satellites" / "sat.toml", now)
 
@@ -188,3 +193,56 @@ def test_a_real_list_is_searched_by_number(tmp_path: Path) -> None:
     loaded = load(tmp_path, tle("NOAA 19", 33591), text, now=tai_from_utc("2018-11-08T00:00:00Z"))
     assert loaded.label.startswith("NOAA 19")
     assert (loaded.errors, loaded.warnings) == ([], [])
+
+
+# A file that is being written
+
+
+def load_while(directory: Path, text: str, act: Callable[[], object]) -> LoadedElements:
+    """Load a file that was written just now, while something happens to it half a second later."""
+    load(directory, tle("ISS (ZARYA)"))
+    (directory / "lists" / "active.txt").write_text(text)
+    section, _ = load_satellite(directory, "sat", load_station(directory))
+    timer = threading.Timer(0.5, act)
+    timer.start()
+    try:
+        return load_elements(section, directory / "satellites" / "sat.toml", NOW)
+    finally:
+        timer.join()
+
+
+@pytest.mark.parametrize("size", [0, 15, 90, len(ISS) - 3], ids=["empty", "name", "first line", "second line"])
+def test_a_half_written_file_is_read_again_until_it_is_whole(tmp_path: Path, size: int) -> None:
+    path = tmp_path / "lists" / "active.txt"
+    loaded = load_while(tmp_path, ISS[:size], lambda: path.write_text(ISS))
+    assert (loaded.label, loaded.errors, loaded.warnings) == ("ISS (ZARYA) (25544)", [], [])
+
+
+def test_a_list_that_is_cut_between_two_satellites_is_read_again(tmp_path: Path) -> None:
+    path = tmp_path / "lists" / "active.txt"
+    assert load_while(tmp_path, JASON, lambda: path.write_text(JASON + ISS)).label == "ISS (ZARYA) (25544)"
+
+
+def test_a_file_that_stays_half_is_refused_all_the_same(tmp_path: Path) -> None:
+    with pytest.raises(ElementsError):
+        load_while(tmp_path, ISS[:90], lambda: None)
+
+
+def test_a_half_file_that_nobody_writes_is_refused_at_once(tmp_path: Path) -> None:
+    begun_s = time.monotonic()
+    refusal(tmp_path, tle("ISS"), ISS[:90])
+    assert time.monotonic() - begun_s < 1.5
+
+
+@pytest.mark.parametrize(
+    ("name", "is_warned"),
+    [("ISS", False), ("iss-zarya", True), ("ISS (ZARYA)", False), ("NOAA-20", True), ("zarya", False)],
+)
+def test_the_only_satellite_of_a_file_is_warned_of_when_it_bears_another_name(
+    tmp_path: Path, name: str, is_warned: bool
+) -> None:
+    warnings = load(tmp_path, tle(name)).warnings
+    assert bool(warnings) is is_warned
+    assert all("is it the right file" in warning for warning in warnings)
+    assert load(tmp_path, tle(name, 25544)).warnings == []
+    assert load(tmp_path, tle(name), ISS.split("\n", 1)[1]).warnings == []  # no name line, no doubt

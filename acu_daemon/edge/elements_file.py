@@ -1,5 +1,6 @@
 """From a satellite's TOML to a propagator: reads the file of elements it names, chooses the set, checks it."""
 
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +25,8 @@ from acu_daemon.orbit.tle import parse_tle
 from acu_daemon.units import DEG
 
 NAMED_PROBLEMS = 5
+RECENT_S = 2.0  # a file that changed within this time may still be in the writing: so long it is read again
+AGAIN_S = 0.2
 _NO_ORIENTATION = EarthOrientation()
 _PARSERS = {"tle": parse_tle, "omm": parse_omm}
 
@@ -44,9 +47,37 @@ def load_elements(
 ) -> LoadedElements:
     """Make the satellite's propagator.
 
+    Of a file that is being written just now half may be there: what is wrong with it is looked at again for a moment.
     orientation: the station's; an Earth-fixed ephemeris needs it.
     Raises: ElementsError: names file, line and reason.
     """
+    end_s = time.monotonic() + RECENT_S
+    while True:
+        is_last = time.monotonic() > end_s or not _is_recent(satellite, toml_path)
+        try:
+            loaded = _load(satellite, toml_path, now_tai_s, orientation)
+        except ElementsError:
+            if is_last:
+                raise
+        else:
+            if is_last or not (loaded.errors or loaded.warnings):
+                return loaded
+        time.sleep(AGAIN_S)
+
+
+def _is_recent(satellite: SatelliteFile, toml_path: Path) -> bool:
+    """Whether the file has changed just now, or was taken away from its directory just now."""
+    section = satellite.elements
+    if isinstance(section, BrouwerSection):
+        return False
+    path = toml_path.parent / section.file
+    try:
+        return abs(time.time() - (path if path.exists() else path.parent).stat().st_mtime) < RECENT_S
+    except OSError:
+        return False
+
+
+def _load(satellite: SatelliteFile, toml_path: Path, now_tai_s: float, orientation: EarthOrientation) -> LoadedElements:
     section = satellite.elements
     if isinstance(section, BrouwerSection):
         return _from_brouwer(satellite, section, toml_path, now_tai_s)

@@ -123,8 +123,8 @@ def select_elements(
     """Choose a satellite's element set: the newest not after now, else the oldest.
 
     Searched by `norad_id` if given; else, in a list of several satellites, by name (case, hyphens and blanks do not
-    count).  A file with one satellite needs neither; without is_whole, sets of the file could not be read, and the one
-    satellite left may be another.
+    count).  A file with one satellite needs neither, but another name is warned of; without is_whole, sets of the
+    file could not be read, and the one satellite left may be another.
 
     Returns: the set, and warnings.
     Raises:  ElementsError: no set, none of this satellite, or a name that two satellites bear.
@@ -141,12 +141,15 @@ def select_elements(
     ids = sorted({one.norad_id for one in found})
     if len(ids) > 1:
         raise ElementsError(f"{sets[0].file}: the name {name!r} fits the satellites {ids}; say which by norad_id")
+    warnings: list[str] = []
+    if norad_id is None and name is not None and not _are_alike(name, found[0].name):
+        warnings.append(_stranger(found[0].file, found[0].label, name))
     past = [one for one in found if one.epoch_tai_s <= now_tai_s]
     if past:
-        return max(past, key=lambda one: one.epoch_tai_s), []
+        return max(past, key=lambda one: one.epoch_tai_s), warnings
     oldest = min(found, key=lambda one: one.epoch_tai_s)
-    epoch = utc_text(oldest.epoch_tai_s, 0)
-    return oldest, [f"{oldest.where}: {oldest.label}: every epoch is ahead of the clock, the oldest ({epoch}) is used"]
+    ahead = f"every epoch is ahead of the clock, the oldest ({utc_text(oldest.epoch_tai_s, 0)}) is used"
+    return oldest, [*warnings, f"{oldest.where}: {oldest.label}: {ahead}"]
 
 
 def select_segments(
@@ -183,11 +186,19 @@ def _is_named(segment: OemSegment, name: str) -> bool:
 
 
 def _doubt_of(segment: OemSegment, norad_id: int | None, name: str) -> list[str]:
-    """A name that is longer or shorter than the file's, such as ISS for ISS (ZARYA), is no other one."""
-    short, long = sorted((_plain(name), _plain(segment.name)), key=len)
-    if short in long or _is_named(segment, name) or _is_number(segment, norad_id):
+    if _are_alike(name, segment.name) or _is_named(segment, name) or _is_number(segment, norad_id):
         return []
-    return [f"{segment.file}: the file is of {segment.label}, the satellite is named {name!r}: is it the right file?"]
+    return [_stranger(segment.file, segment.label, name)]
+
+
+def _are_alike(name: str, other: str) -> bool:
+    """A name that is longer or shorter than the file's, such as ISS for ISS (ZARYA), is no other one, nor is none."""
+    short, long = sorted((_plain(name), _plain(other)), key=len)
+    return short in long
+
+
+def _stranger(file: str, label: str, name: str) -> str:
+    return f"{file}: the file is of {label}, the satellite is named {name!r}: is it the right file?"
 
 
 def _version_of(segment: OemSegment) -> list[str]:
