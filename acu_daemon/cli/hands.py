@@ -22,8 +22,8 @@ def _say(word: str, state: Path | None, *, is_rehearsal: bool) -> None:
 def arm(state: State = None, rehearsal: Rehearsal = False) -> None:
     """Let the running daemon move the antenna.
 
-    Needed after `disarm`, after a STOP by another hand, the emergency stop or an open door, and with
-    `[safety] arm = "manual"` after every start.
+    Needed after `disarm`, after a STOP by another hand, the emergency stop or an open door: these hold through restarts
+    and for later passes too.  With `[safety] arm = "manual"` needed for every pass.
     It goes on with the pass at once: the present angles are written first, then the path.  `acu-daemon status` tells
     what it is doing.
 
