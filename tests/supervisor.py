@@ -1,6 +1,7 @@
 """A small systemd for tests: runs the unit file itself, with readiness, watchdog, restarts and the two kinds of end."""
 
 import contextlib
+import math
 import os
 import re
 import shlex
@@ -16,6 +17,7 @@ from pathlib import Path
 UNIT = Path(__file__).resolve().parents[1] / "config" / "systemd" / "acu-daemon@.service"
 UNITS_S = {"ms": 1e-3, "s": 1.0, "": 1.0, "min": 60.0}
 PATIENCE_S = 60.0
+CLEAN_SIGNALS = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM, signal.SIGPIPE)  # an end by one of them is a success
 
 
 def read_unit(path: Path = UNIT) -> dict[str, list[str]]:
@@ -94,7 +96,8 @@ class Supervisor:
                 self._call("ExecStop", {})
             self.results.append(result)
             status = str(self.process.returncode)
-            self._call("ExecStopPost", {"SERVICE_RESULT": result, "EXIT_STATUS": status})
+            code = "killed" if self.process.returncode < 0 else "exited"
+            self._call("ExecStopPost", {"SERVICE_RESULT": result, "EXIT_CODE": code, "EXIT_STATUS": status})
             if status in self._unit["RestartPreventExitStatus"]:
                 return
             self._is_stopping.wait(self._seconds("RestartSec"))
@@ -109,20 +112,24 @@ class Supervisor:
                 self.ready_count += text == "READY=1"
                 if text == "WATCHDOG=1":
                     fed_s = time.monotonic()
+                if text == "STOPPING=1":
+                    fed_s = math.inf
                 if text.startswith("STATUS="):
                     self.statuses.append(text.removeprefix("STATUS="))
             if self._is_stopping.is_set() and not result:
-                result = self._end(process)
+                result = self._end(process, is_ready=is_ready)
             elif is_ready and not result and time.monotonic() - fed_s > self._seconds("WatchdogSec"):
                 result = "watchdog"
                 process.send_signal(signal.SIGABRT)
                 self._kill_after(process, "TimeoutAbortSec")
         if not result or result == "success":
-            result = {0: "success"}.get(process.returncode, "exit-code" if process.returncode > 0 else "signal")
+            is_clean = process.returncode == 0 or -process.returncode in CLEAN_SIGNALS
+            result = "success" if is_clean else "exit-code" if process.returncode > 0 else "signal"
         return result
 
-    def _end(self, process: "subprocess.Popen[bytes]") -> str:
-        self._call("ExecStop", {})
+    def _end(self, process: "subprocess.Popen[bytes]", *, is_ready: bool) -> str:
+        if is_ready:  # what has not started is not asked to stop, but killed
+            self._call("ExecStop", {})
         process.terminate()
         return "timeout" if self._kill_after(process, "TimeoutStopSec") else "success"
 

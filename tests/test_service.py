@@ -110,6 +110,11 @@ def test_p4_a_daemon_that_is_not_started_again_leaves_its_antenna_stopped(tmp_pa
     assert why_not({"SERVICE_RESULT": "exit-code", "EXIT_STATUS": "4", "RUNTIME_DIRECTORY": str(tmp_path)}) != ""
 
 
+def test_a_daemon_that_a_stop_killed_while_it_started_has_stopped_nothing(tmp_path: Path) -> None:
+    ended = {"SERVICE_RESULT": "success", "EXIT_CODE": "killed", "EXIT_STATUS": "TERM"}
+    assert why_not({**ended, "RUNTIME_DIRECTORY": str(tmp_path)}) == ""
+
+
 def test_a_final_stop_that_the_daemon_did_not_survive_is_one(tmp_path: Path) -> None:
     (tmp_path / "final").touch()
     assert why_not({"SERVICE_RESULT": "timeout", "RUNTIME_DIRECTORY": str(tmp_path)}) == ""
@@ -189,3 +194,30 @@ def test_p4_a_daemon_killed_in_mid_pass_that_is_refused_its_next_start_leaves_it
     assert running.results == ["signal", "exit-code"]
     assert running.post_codes == [0, 0]
     assert last_mode(rig) == "STANDBY"
+
+
+@realtime
+def test_p4_a_final_stop_while_the_daemon_starts_after_a_crash_reaches_the_antenna(rig: Any, tmp_path: Path) -> None:
+    """It has written nothing, its predecessor has; what has not started yet is killed without ExecStop=."""
+    with service(rig, tmp_path) as running:
+        wait_until(lambda: any("AUTOTRACK" in status for status in running.statuses))
+        assert running.process is not None
+        running.process.kill()
+        wait_until(lambda: len(running.starts_s) == 2)
+        time.sleep(0.2)
+        running.stop()
+    assert running.results == ["signal", "success"]
+    assert running.post_codes == [0, 0]
+    assert last_mode(rig) == "STANDBY"
+
+
+@realtime
+def test_p4_the_watchdog_leaves_a_stop_alone_that_waits_for_the_link(rig: Any, tmp_path: Path) -> None:
+    with service(rig, tmp_path) as running:
+        wait_until(lambda: any("AUTOTRACK" in status for status in running.statuses))
+        assert running.process is not None
+        rig.acu.kill()
+        running.process.terminate()  # an end of the daemon's own, such as after the pass
+        wait_until(lambda: bool(running.results))
+    assert running.results[0] == "exit-code"
+    assert "stop.timeout" in running.journal.read_text()

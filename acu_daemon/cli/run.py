@@ -233,6 +233,7 @@ async def _run(
         on_reading=recording.add if recording else None,
         on_fit=kept.offer,
         on_state=kept.see,
+        on_end=lambda: notifier("STOPPING=1"),  # no tick feeds the watchdog from here on: it lets the daemon stop
         files_alarm=files_alarm,
     )
     loop = asyncio.get_running_loop()

@@ -55,6 +55,8 @@ def why_not(environment: Mapping[str, str]) -> str:
     result, status = environment.get("SERVICE_RESULT", ""), environment.get("EXIT_STATUS", "")
     if result == "exit-code" and status == NOT_RESTARTED:
         return ""
+    if result == "success" and environment.get("EXIT_CODE") == "killed":
+        return ""  # by the signal of a stop, while it started: its predecessor may have left the antenna moving
     if result == "success":
         return "the daemon ended by itself and stopped the antenna"
     if not (Path(environment.get("RUNTIME_DIRECTORY", "/nonexistent")) / FINAL).exists():

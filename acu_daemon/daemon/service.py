@@ -83,13 +83,16 @@ class Service:
         on_fit: Callable[[FitResult], None] | None = None,
         on_state: Callable[[ControlState], None] | None = None,
         files_alarm: Callable[[], str] = str,
+        on_end: Callable[[], None] | None = None,
     ) -> None:
+        """on_end: called when the run is over, before the safe stop, which may take STOP_DEADLINE_S."""
         self._job = job
         self._clock = clock
         self._runner = runner
         self._on_snapshot = on_snapshot
         self._snapshot_ticks = snapshot_ticks
         self._on_state = on_state
+        self._on_end = on_end
         self._files_alarm = files_alarm
         self._ticked = asyncio.Event()
         self._stop_reason = ""
@@ -128,6 +131,8 @@ class Service:
                 try:
                     reason = await self._track()
                 finally:
+                    if self._on_end is not None:
+                        self._on_end()
                     is_stopped = await self._safe_stop()
                     self._leave(is_stopped=is_stopped)
                     link.cancel()
