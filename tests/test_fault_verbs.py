@@ -2,16 +2,20 @@
 
 import asyncio
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 from typing import get_args
 
 import pytest
+from fake_sky import Bench
 
+from acu_daemon.edge.clock import LoopClock
 from acu_daemon.errors import ConfigError
 from acu_daemon.protocol.frame import NAK
 from acu_daemon.protocol.messages import Ack, AcuMode, Backup, Garbled, Nak, Poll, Status
 from acu_daemon.protocol.sa3842 import ReplyDecoder, encode_command, encode_reply
+from acu_daemon.sim.acu_faults import break_acu
 from acu_daemon.sim.fault_board import FaultBoard
 from acu_daemon.sim.fault_control import answer_line
 from acu_daemon.sim.fault_verbs import (
@@ -25,6 +29,7 @@ from acu_daemon.sim.fault_verbs import (
     vocabulary,
 )
 from acu_daemon.sim.frame_faults import FaultyWire, mangle
+from acu_daemon.sim.pedestal import AxisTrouble
 from acu_daemon.sim.scenario import read_faults, read_scenario
 from acu_daemon.sim.virtual import run_virtual
 
@@ -125,6 +130,30 @@ def test_a_probability_is_rolled_for_every_time_it_happens_and_a_seed_repeats_it
     times = [history(f"reset count=40 duration_s=0.1 probability=0.5 seed={seed}") for seed in (1, 1, 2)]
     assert times[0] == times[1] != times[2]
     assert 10 < len(times[0]) < 30
+
+
+def test_faults_of_one_axis_that_overlap_each_end_by_themselves() -> None:
+    async def main() -> list[AxisTrouble | None]:
+        bench, board = Bench(), FaultBoard()
+        break_acu(bench.acu, board, LoopClock(bench.tai_s))
+        for text in (
+            "stuck duration_s=4",
+            "wind start_s=1 duration_s=1",
+            "limit-switch axis=both start_s=1 duration_s=1",
+        ):
+            board.add(parse_fault(text))
+        seen = []
+        for _ in range(3):
+            await asyncio.sleep(1.5)
+            trouble = bench.acu.antenna.az.trouble
+            seen.append(trouble and replace(trouble))
+        return seen
+
+    both, one, none = run_virtual(main())
+    assert both is not None
+    assert (both.is_stuck, both.gust_deg_s, both.upper_stop_deg) == (True, 0.5, 30.0)
+    assert one == AxisTrouble(is_stuck=True)
+    assert none is None
 
 
 def strikes(text: str, frame_count: int, way: Direction = "reply") -> list[bool]:

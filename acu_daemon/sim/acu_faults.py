@@ -1,7 +1,7 @@
 """SIMULATION: what breaks in the ACU, at the panel and on the pedestal when a fault begins, and what its end mends."""
 
 from collections.abc import Callable
-from random import Random
+from math import inf
 
 from acu_daemon.edge.clock import Clock
 from acu_daemon.protocol.messages import ResetFault
@@ -79,44 +79,46 @@ def _silence(acu: FakeAcu, _fault: Fault, is_on: bool, _now_tai_s: float) -> Non
     acu.antenna.trouble.is_silent = is_on
 
 
-def _axis(change: Callable[[Axis, AxisTrouble, Fault], None]) -> Act:
-    """A trouble of the axes that a fault names; its end leaves none."""
+def _axis(change: Callable[[Axis, AxisTrouble, Fault, bool], None]) -> Act:
+    """A trouble of the axes that a fault names; those of other verbs go on when it ends."""
 
     def act(acu: FakeAcu, fault: Fault, is_on: bool, _now_tai_s: float) -> None:
         for name in fault.axes:
             axis = acu.antenna.az if name == "azimuth" else acu.antenna.el
-            axis.trouble = AxisTrouble(random=Random(f"{fault.seed} {name}")) if is_on else None
-            if axis.trouble is not None:
-                change(axis, axis.trouble, fault)
+            trouble = axis.trouble or AxisTrouble()
+            if is_on:
+                trouble.random.seed(f"{fault.seed} {name}")
+            change(axis, trouble, fault, is_on)
+            axis.trouble = None if trouble == AxisTrouble() else trouble
 
     return act
 
 
-def _stop_here(axis: Axis, trouble: AxisTrouble, fault: Fault) -> None:
+def _stop_here(axis: Axis, trouble: AxisTrouble, fault: Fault, is_on: bool) -> None:
     if fault.amount > 0.0:
-        trouble.upper_stop_deg = axis.angle_deg
+        trouble.upper_stop_deg = axis.angle_deg if is_on else inf
     else:
-        trouble.lower_stop_deg = axis.angle_deg
+        trouble.lower_stop_deg = axis.angle_deg if is_on else -inf
 
 
-def _stick(_axis: Axis, trouble: AxisTrouble, _fault: Fault) -> None:
-    trouble.is_stuck = True
+def _stick(_axis: Axis, trouble: AxisTrouble, _fault: Fault, is_on: bool) -> None:
+    trouble.is_stuck = is_on
 
 
-def _run_away(_axis: Axis, trouble: AxisTrouble, fault: Fault) -> None:
-    trouble.runaway_deg_s = fault.amount
+def _run_away(_axis: Axis, trouble: AxisTrouble, fault: Fault, is_on: bool) -> None:
+    trouble.runaway_deg_s = fault.amount if is_on else None
 
 
-def _slow_down(_axis: Axis, trouble: AxisTrouble, fault: Fault) -> None:
-    trouble.rate_share = fault.amount
+def _slow_down(_axis: Axis, trouble: AxisTrouble, fault: Fault, is_on: bool) -> None:
+    trouble.rate_share = fault.amount if is_on else 1.0
 
 
-def _reverse(_axis: Axis, trouble: AxisTrouble, _fault: Fault) -> None:
-    trouble.is_reversed = True
+def _reverse(_axis: Axis, trouble: AxisTrouble, _fault: Fault, is_on: bool) -> None:
+    trouble.is_reversed = is_on
 
 
-def _blow(_axis: Axis, trouble: AxisTrouble, fault: Fault) -> None:
-    trouble.gust_deg_s = fault.amount
+def _blow(_axis: Axis, trouble: AxisTrouble, fault: Fault, is_on: bool) -> None:
+    trouble.gust_deg_s = fault.amount if is_on else 0.0
 
 
 _ACTS: dict[VerbName, Act] = {

@@ -41,7 +41,7 @@ class AxisTrouble:
     upper_stop_deg: float = inf  # a limit switch that tripped here
     lower_stop_deg: float = -inf
     gust_deg_s: float = 0.0  # 1 sigma
-    random: Random = field(default_factory=Random)
+    random: Random = field(default_factory=Random, compare=False)
 
 
 class Axis:
