@@ -28,6 +28,7 @@ from acu_daemon.protocol.messages import (
     Identity,
     Nak,
     Poll,
+    Reply,
     SelectBackup,
     SelectMode,
     Status,
@@ -232,9 +233,15 @@ class Foreground:
         return state.is_stop_due or (is_held and state.is_armed(self._config))
 
     async def safe_stop(self) -> bool:
-        """Stop the antenna.  True: stopped, or left to somebody else; False: nobody knows."""
-        state, config = self._area.state, self._config
-        if state.status is None:
-            return False
-        clears_watchdog = config.register_watchdog_s > 0.0 and state.watchdog is not Watchdog.REFUSED
-        return await stop_antenna(self._port, state.status, clears_watchdog=clears_watchdog)
+        """Stop the antenna.  True: stopped, or left to somebody else; False: not acknowledged."""
+        clears_watchdog = self._config.register_watchdog_s > 0.0 and self._area.state.watchdog is not Watchdog.REFUSED
+        return await stop_antenna(self._port, await self._newest_status(), clears_watchdog=clears_watchdog)
+
+    async def _newest_status(self) -> Status:
+        """Ask for it where the run has ended before its first one; the caller has a deadline."""
+        status: Reply | None = self._area.state.status
+        while not isinstance(status, Status):
+            await self._port.wait_until_up()
+            status = (await self._port.exchange(Poll())).reply
+            await self._port.idle_gap()
+        return status
