@@ -102,7 +102,7 @@ class ProcessFitRunner:
             "acu_daemon.edge.fit_child",
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
-            start_new_session=True,  # a Ctrl-C is for the daemon, which ends the child itself
+            process_group=0,  # a Ctrl-C is for the daemon; a session of its own would not heed how nice it is
             limit=2**22,
         )
         self.start_count += 1
