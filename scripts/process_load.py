@@ -61,6 +61,21 @@ def busy_cores(count: int) -> Iterator[None]:
         yield
 
 
+def try_nice(pid: int, niceness: int) -> bool:
+    """Give a process in a session of its own this niceness.  False: not permitted.
+
+    Where the kernel shares the processor between sessions first, the session gets it too.
+    """
+    try:
+        os.setpriority(os.PRIO_PROCESS, pid, niceness)
+        session = Path(f"/proc/{pid}/autogroup")
+        if session.exists():
+            session.write_text(str(niceness))
+    except PermissionError:
+        return False
+    return True
+
+
 def try_fifo(pid: int) -> bool:
     """Schedule a process by SCHED_FIFO.  False: not permitted."""
     try:

@@ -1,15 +1,18 @@
 """P4 and P9 with real processes: SIGKILL of the daemon in a loss, death and hang of the fit process in autotrack.
 
-The figures are printed (pytest -rP); what is asserted is generous, for the machine may be busy.
+Half of the kills come while every core is busy.  The daemon stands as far ahead of that as its unit says, where that is
+permitted, and loads bytecode, as where it is installed.  The figures are printed (pytest -rP); what is asserted leaves
+room for a machine that is busy with more than that.
 """
 
 import json
+import os
 import signal
+import subprocess
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
-from os import kill
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -17,21 +20,25 @@ from typing import Any
 import numpy as np
 import pytest
 from script_modules import load
+from supervisor import read_unit
 
 from acu_daemon.model import sky_angle_deg
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.report.trace import read_trace
 from acu_daemon.report.wire import HALF_SERVO_TICK_S, read_writes, satellite_at
 
-pass_rig = load("pass_rig")
+pass_rig, process_load = load("pass_rig"), load("process_load")
 pytestmark = pytest.mark.realtime
 
-LOSS_S = (30.0, 64.0)  # from the scene's start
-FIRST_KILL_S, KILLS, APART_S = {"tcp": 34.0, "pty": 41.0}, 2, 14.0
+LOSS_S = (30.0, 92.0)  # from the scene's start
+FIRST_KILL_S, APART_S = {"tcp": 34.0, "pty": 41.0}, 14.0
+LOADS = ("quiet", "quiet", "busy", "busy")  # of the machine, at each kill
+BUSY_S = (61.0, 91.0)
 RESTART_S = 0.1  # as the unit's RestartSec
+NICENESS = int(read_unit()["Nice"][-1])
 CORRECT_DEG = 0.1
 ASKED_S = 3.0
-GENEROUS_S = 4 * ASKED_S  # a busy machine takes its time to load numpy, and the satellite runs on meanwhile
+LIMIT_S = {True: 2 * ASKED_S, False: 4 * ASKED_S}  # ahead of the others, and where that is not permitted
 PATIENCE_S = 60.0
 
 
@@ -51,6 +58,7 @@ class Crashes:
     restarts: list[list[dict[str, Any]]] = field(default_factory=list)  # the log of each daemon
     errors: str = ""
     oldest_fit_s: float = 0.0
+    is_ahead: bool = True
     done: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -61,6 +69,14 @@ class Crashes:
     def sleep_until(self, since_start_s: float) -> None:
         time.sleep(max(0.0, self.rig.scene.start_tai_s + since_start_s - self.tai_s))
 
+    def start_daemon(self) -> None:
+        """As its unit does."""
+        rig = self.rig
+        arguments = [*rig.arguments("run"), "--state", str(rig.directory / "state")]
+        with rig.log.open("w") as log, rig.errors.open("w") as errors:
+            rig.daemon = subprocess.Popen(arguments, stdout=log, stderr=errors, text=True, start_new_session=True)
+        self.is_ahead &= process_load.try_nice(rig.daemon.pid, NICENESS)
+
     def crash(self) -> None:
         """SIGKILL, and what systemd does then."""
         self.keep_log()
@@ -68,7 +84,7 @@ class Crashes:
         self.rig.daemon.kill()
         self.rig.daemon.wait()
         time.sleep(RESTART_S)
-        self.rig.start_daemon()
+        self.start_daemon()
 
     def keep_log(self) -> None:
         whole = [line for line in self.rig.log.read_text().splitlines(keepends=True) if line.endswith("\n")]
@@ -83,7 +99,7 @@ class Crashes:
     def hit_fit_process(self, number: signal.Signals) -> None:
         """Kill or stop the fit process; wait until another one fits."""
         wait_until(lambda: len(children(self.rig.daemon.pid)) == 1)
-        kill(children(self.rig.daemon.pid)[0], number)
+        os.kill(children(self.rig.daemon.pid)[0], number)
         hit_tai_s = self.tai_s
         before = len(self.fit_troubles())
         wait_until(lambda: len(self.fit_troubles()) > before)
@@ -102,10 +118,10 @@ class Crashes:
     def run(self) -> "Crashes":
         rig = self.rig
         rig.start_acu()
-        rig.start_daemon()
+        self.start_daemon()
         self.sleep_until(LOSS_S[0])
         wait_until(lambda: rig.state == "HOLD/FITTED")
-        for number in range(KILLS):
+        for number in range(len(LOADS)):
             self.sleep_until(FIRST_KILL_S[rig.link] + number * APART_S)
             self.crash()
         self.sleep_until(LOSS_S[1])
@@ -151,17 +167,30 @@ def rig_file(rig: Any, name: str) -> Path:
     return path
 
 
+def keep_busy(crashes: Crashes) -> None:
+    """Keep every core busy while BUSY_S lasts."""
+    crashes.sleep_until(BUSY_S[0])
+    with process_load.busy_cores(os.cpu_count()):
+        crashes.sleep_until(BUSY_S[1])
+
+
 @pytest.fixture(scope="module")
 def crashes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, "Future[Crashes]"]]:
     """Both links at once, on one clock."""
-    scene = pass_rig.make_scene(tmp_path_factory.mktemp("scene"), None, 120.0)
+    scene = pass_rig.make_scene(tmp_path_factory.mktemp("scene"), None, 150.0)
     scenario = scene.config / "scenario.toml"
     times = "".join(
         f"{name} = {utc_text(scene.start_tai_s + since_s)}\n"
         for name, since_s in zip(("from_utc", "to_utc"), LOSS_S, strict=True)
     )
     scenario.write_text(scenario.read_text().split("[[loss]]")[0] + f'[[loss]]\ncause = "receiver"\n{times}')
-    with pass_rig.rigs(scene, pass_rig.LINKS, tmp_path_factory.mktemp("rigs")) as made, ThreadPoolExecutor(2) as pool:
+    with (
+        pytest.MonkeyPatch.context() as environment,
+        pass_rig.rigs(scene, pass_rig.LINKS, tmp_path_factory.mktemp("rigs")) as made,
+        ThreadPoolExecutor(3) as pool,
+    ):
+        environment.delenv("PYTHONDONTWRITEBYTECODE", raising=False)
+        pool.submit(keep_busy, Crashes(made[0]))
         yield {rig.link: pool.submit(Crashes(rig).run) for rig in made}
 
 
@@ -172,10 +201,13 @@ def test_p4_a_daemon_killed_in_a_loss_is_back_on_the_path_at_once(
     crashed = crashes[link].result()
     seconds = crashed.seconds_to_correct_writes()
     error_deg = crashed.error_when_back_deg()
-    print(f"{link}: SIGKILL to correct register writes, s: {', '.join(f'{one:.2f}' for one in seconds)}", end="; ")
-    print(f"median {median(seconds):.2f}, asked {ASKED_S:g}; beam error when the signal is back {error_deg:.3f} deg")
-    assert len(seconds) == KILLS
-    assert max(seconds) <= GENEROUS_S
+    ahead = f"at niceness {NICENESS}, as the unit says" if crashed.is_ahead else "at niceness 0: more is not permitted"
+    print(f"{link}, {ahead}: SIGKILL to correct register writes, s, asked {ASKED_S:g}:")
+    for load_name in dict.fromkeys(LOADS):
+        those = [one for one, at in zip(seconds, LOADS, strict=True) if at == load_name]
+        print(f"  {load_name}: {', '.join(f'{one:.2f}' for one in those)}; median {median(those):.2f}")
+    print(f"  beam error when the signal is back {error_deg:.3f} deg")
+    assert max(seconds) <= LIMIT_S[crashed.is_ahead]
     assert error_deg <= CORRECT_DEG
     assert crashed.errors == ""
 
