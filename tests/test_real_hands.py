@@ -55,3 +55,33 @@ def test_p1_a_person_arms_and_disarms_the_running_daemon(tmp_path: Path) -> None
         refused = acu_daemon("clear", "--state", rig.directory / "state")
         assert refused.code == 1
         assert "--rehearsal" in refused.err
+
+
+def start_again(rig: Any) -> None:
+    """SIGKILL was before."""
+    rig.start_daemon()
+    wait_until(lambda: rig.events("acu.identified"))
+
+
+def test_p1_what_a_person_does_while_the_daemon_is_dead_and_a_disarm_outlive_it(tmp_path: Path) -> None:
+    scene = pass_rig.make_scene(tmp_path / "scene", None, 120.0)
+    with pass_rig.rigs(scene, ["tcp"], tmp_path) as (rig,):
+        rig.start_acu()
+        rig.start_daemon()
+        wait_until(lambda: rig.state == "AUTOTRACK/FITTED")
+        rig.daemon.kill()
+        rig.daemon.wait()
+        stopped = acu_daemon("safe-stop", "--config", rig.config)
+        assert stopped.code == 0, stopped.err
+        start_again(rig)
+        wait_until(lambda: seen(rig)["disarmed_by"] == "another hand that stopped the antenna")
+        assert say(rig, "arm").code == 0
+        wait_until(lambda: rig.state == "AUTOTRACK/FITTED")
+        assert say(rig, "disarm").code == 0
+        wait_until(lambda: seen(rig)["arming"] == "disarmed")
+        wait_until((rig.directory / "state-rehearsal" / "disarmed").exists)
+        rig.daemon.kill()
+        rig.daemon.wait()
+        (rig.directory / "state-rehearsal" / "run.json").write_bytes(b"{")
+        start_again(rig)
+        assert (seen(rig)["arming"], seen(rig)["disarmed_by"], seen(rig)["write_count"]) == ("disarmed", "a person", 0)
