@@ -10,7 +10,8 @@ from typing import Annotated
 import typer
 
 from acu_daemon import PROCESS_START_S
-from acu_daemon.config import SatelliteFile, StationFile, load_satellite, load_station
+from acu_daemon.config import load_satellite, load_station
+from acu_daemon.config_tables import SatelliteFile, StationFile
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.elements_file import LoadedElements, load_elements
 from acu_daemon.edge.state import refuse_world_writable

@@ -10,7 +10,8 @@ from typing import Annotated
 import typer
 
 from acu_daemon.cli.options import Config
-from acu_daemon.config import StationFile, load_station
+from acu_daemon.config import load_station
+from acu_daemon.config_tables import StationFile
 from acu_daemon.daemon.port import AcuPort
 from acu_daemon.daemon.stopping import stop_antenna
 from acu_daemon.edge.clock import SystemClock

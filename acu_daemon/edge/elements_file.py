@@ -4,7 +4,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from acu_daemon.config import BrouwerSection, ElementsFileSection, SatelliteFile
+from acu_daemon.config_tables import BrouwerSection, ElementsFileSection, SatelliteFile
 from acu_daemon.errors import ElementsError
 from acu_daemon.model import EarthOrientation
 from acu_daemon.orbit.brouwer import BrouwerElements, BrouwerPropagator

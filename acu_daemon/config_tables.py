@@ -1,0 +1,229 @@
+"""The tables of station.toml and satellites/NAME.toml: keys, defaults, what each value may be (design section 7)."""
+
+from datetime import UTC, datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+
+from acu_daemon.edge.link import make_link
+from acu_daemon.errors import UsageError
+from acu_daemon.model import AxisLimits, EarthOrientation, Site, Station
+from acu_daemon.orbit.elements import ElementLimits
+from acu_daemon.orbit.timescales import tai_from_utc
+from acu_daemon.protocol.sa3842 import address_byte
+
+DEFAULT_LIMITS = ElementLimits()
+
+
+def _tai(value: object) -> float:
+    if isinstance(value, datetime):
+        if value.tzinfo is None:
+            raise ValueError("expected a time that ends in Z (UTC)")
+        return tai_from_utc(value.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%S.%fZ"))
+    if isinstance(value, str):
+        return tai_from_utc(value)
+    raise ValueError("expected a time like 1989-01-31T09:58:00Z")
+
+
+UtcTime = Annotated[float, BeforeValidator(_tai)]
+Positive = Annotated[float, Field(gt=0)]
+Name = Annotated[str, Field(min_length=1)]
+
+
+class Section(BaseModel):
+    """A table of a TOML file: no unknown keys, no infinite numbers, no text where a number belongs."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+
+    def _must_be_below(self, lower: str, upper: str) -> None:
+        low, high = getattr(self, lower), getattr(self, upper)
+        if low >= high:
+            raise ValueError(f"{lower} = {low:g}: expected less than {upper} = {high:g}")
+
+
+class StationSection(Section):
+    latitude_deg: float = Field(ge=-90, le=90)
+    longitude_deg: float = Field(ge=-180, le=360)
+    height_m: float = Field(ge=-500, le=9000)
+    name: Name = "station"
+    min_elevation_deg: float = Field(default=5.0, ge=0, lt=90)
+    uncertainty_m: float = Field(default=0.0, ge=0)
+
+
+class AxisSection(Section):
+    min_deg: float = Field(ge=-720, le=720)
+    max_deg: float = Field(ge=-720, le=720)
+    max_rate_deg_s: float = Field(gt=0, le=90)
+    max_acceleration_deg_s2: float = Field(gt=0, le=360)
+
+    @model_validator(mode="after")
+    def _min_below_max(self) -> "AxisSection":
+        self._must_be_below("min_deg", "max_deg")
+        return self
+
+    def limits(self) -> AxisLimits:
+        return AxisLimits(self.min_deg, self.max_deg, self.max_rate_deg_s, self.max_acceleration_deg_s2)
+
+
+class ElevationSection(AxisSection):
+    min_deg: float = Field(ge=-90, le=180)
+    max_deg: float = Field(ge=-90, le=180)
+
+
+def _address(value: object) -> str:
+    text = str(value)
+    address_byte(text)
+    return text
+
+
+def _url(value: str) -> str:
+    try:
+        make_link(value)
+    except UsageError as error:
+        raise ValueError(str(error)) from None
+    return value
+
+
+class AcuSection(Section):
+    url: Annotated[str, AfterValidator(_url)]
+    azimuth: AxisSection
+    elevation: ElevationSection
+    dialect: Literal["sa3842"] = "sa3842"
+    address: Annotated[str, BeforeValidator(_address)] = "1"
+    period_s: float = Field(default=0.1, ge=0.1, le=0.2)  # more, and one lost reply is half a second of silence
+    device_delay_s: float = Field(default=0.010, ge=0, le=0.1)
+
+
+class ReceiverSection(Section):
+    beamwidth_deg: float = Field(default=1.0, gt=0, le=30)
+    lock_dwell_s: float = Field(default=1.0, ge=0, le=60)
+
+
+class TimeSection(Section):
+    ut1_utc_s: float = Field(default=0.0, ge=-1, le=1)
+    polar_motion_x_arcsec: float = Field(default=0.0, ge=-2, le=2)
+    polar_motion_y_arcsec: float = Field(default=0.0, ge=-2, le=2)
+
+
+class ReadingsSection(Section):
+    sigma_azimuth_deg: Positive = 0.05
+    sigma_elevation_deg: Positive = 0.05
+    bias_sigma_azimuth_deg: float = Field(default=0.1, ge=0)
+    bias_sigma_elevation_deg: float = Field(default=0.1, ge=0)
+    bias_sigma_azimuth_sec_deg: float = Field(default=0.003, ge=0)  # grows as 1 / cos(el): the axes are not square
+    bias_sigma_elevation_cot_deg: float = Field(default=0.0, ge=0)  # grows as cot(el), towards the horizon
+
+
+class TrackingSection(Section):
+    horizon_s: float = Field(default=90.0, ge=10, le=600)
+    low_water_s: float = Field(default=30.0, ge=2, le=500)
+    max_fit_elevation_deg: float = Field(default=80.0, gt=0, le=90)
+    estimator: Literal["circular", "deterministic", "kalman", "full"] = "full"
+    preposition_s: float = Field(default=120.0, ge=10, le=3600)
+    search_along_s: Positive = 10.0
+    search_across_deg: Positive = 2.0
+
+    @model_validator(mode="after")
+    def _water_below_horizon(self) -> "TrackingSection":
+        self._must_be_below("low_water_s", "horizon_s")
+        return self
+
+
+class SafetySection(Section):
+    arm: Literal["auto", "manual"] = "auto"
+    register_watchdog_s: float = Field(default=5.0, ge=0, le=600)  # the ACU's W; 0: it is not touched
+    following_error_deg: float = Field(default=1.0, ge=0.2, le=30)  # on the sky; less is lag, noise and wind
+    following_error_s: float = Field(default=2.0, ge=0, le=60)  # 0: the axes are not watched
+    clock_alarm_beam_fraction: float = Field(default=0.1, gt=0, le=10)
+
+    @model_validator(mode="after")
+    def _none_or_enough(self) -> "SafetySection":
+        for name, least_s in (("register_watchdog_s", 2.0), ("following_error_s", 0.5)):
+            if 0.0 < getattr(self, name) < least_s:
+                raise ValueError(f"{name} = {getattr(self, name):g}: expected 0 (off) or at least {least_s:g}")
+        return self
+
+
+class StationFile(Section):
+    station: StationSection
+    acu: AcuSection
+    receiver: ReceiverSection = ReceiverSection()
+    time: TimeSection = TimeSection()
+    readings: ReadingsSection = ReadingsSection()
+    tracking: TrackingSection = TrackingSection()
+    safety: SafetySection = SafetySection()
+
+    @property
+    def site(self) -> Site:
+        s, t = self.station, self.time
+        return Site(
+            Station(s.name, s.latitude_deg, s.longitude_deg, s.height_m),
+            EarthOrientation(t.ut1_utc_s, t.polar_motion_x_arcsec, t.polar_motion_y_arcsec),
+        )
+
+
+class SatelliteSection(Section):
+    name: Name
+    norad_id: int | None = Field(default=None, ge=1, le=999999999)
+
+
+class LimitsSection(Section):
+    """Sanity limits of this satellite's elements; the defaults suit low orbits."""
+
+    min_semi_major_axis_km: Positive = DEFAULT_LIMITS.min_semi_major_axis_km
+    max_semi_major_axis_km: Positive = DEFAULT_LIMITS.max_semi_major_axis_km
+    min_eccentricity: float = Field(default=DEFAULT_LIMITS.min_eccentricity, ge=0, lt=1)
+    max_eccentricity: float = Field(default=DEFAULT_LIMITS.max_eccentricity, ge=0, lt=1)
+    min_inclination_deg: float = Field(default=DEFAULT_LIMITS.min_inclination_deg, ge=0, le=180)
+    max_inclination_deg: float = Field(default=DEFAULT_LIMITS.max_inclination_deg, ge=0, le=180)
+    warn_age_days: Positive = DEFAULT_LIMITS.warn_age_days
+    max_age_days: Positive = DEFAULT_LIMITS.max_age_days
+
+    @model_validator(mode="after")
+    def _min_below_max(self) -> "LimitsSection":
+        for what in ("semi_major_axis_km", "eccentricity", "inclination_deg"):
+            self._must_be_below(f"min_{what}", f"max_{what}")
+        return self
+
+    def limits(self) -> ElementLimits:
+        return ElementLimits(**self.model_dump())
+
+
+class ElementsFileSection(Section):
+    kind: Literal["tle", "omm", "oem"]
+    file: str
+    limits: LimitsSection = LimitsSection()
+
+
+class BrouwerSection(Section):
+    kind: Literal["brouwer"]
+    epoch_utc: UtcTime
+    semi_major_axis_km: float = Field(ge=1_000, le=1_000_000)
+    eccentricity: float = Field(ge=0, lt=1)
+    inclination_deg: float = Field(ge=0, le=180)
+    raan_deg: float = Field(ge=-360, le=360)
+    arg_perigee_deg: float = Field(ge=-360, le=360)
+    mean_anomaly_deg: float = Field(ge=-360, le=360)
+    short_period: bool = True
+    limits: LimitsSection = LimitsSection()
+
+
+class UncertaintySection(Section):
+    position_km: float | None = Field(default=None, gt=0, le=300)  # a fit from much more may end on no orbit at all
+    velocity_m_s: float | None = Field(default=None, gt=0, le=300)
+
+
+class FallbackSection(Section):
+    acquire_s: float = Field(default=60.0, ge=0)
+    hold_s: float = Field(default=1200.0, ge=0)
+    search_s: float = Field(default=120.0, ge=0)
+
+
+class SatelliteFile(Section):
+    satellite: SatelliteSection
+    elements: Annotated[ElementsFileSection | BrouwerSection, Field(discriminator="kind")]
+    uncertainty: UncertaintySection = UncertaintySection()
+    fallback: FallbackSection = FallbackSection()
+    receiver: dict[str, Any] = {}
+    readings: dict[str, Any] = {}
+    tracking: dict[str, Any] = {}
