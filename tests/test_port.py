@@ -144,6 +144,29 @@ def test_p3_an_acu_that_another_client_holds_is_asked_again_each_second_and_the_
     play(story)
 
 
+def test_p3_the_pauses_between_attempts_double_up_to_a_second_and_begin_anew_once_the_acu_has_answered() -> None:
+    begun_s: list[float] = []
+
+    async def story(port: AcuPort, link: MemoryLink, clock: LoopClock) -> None:
+        async def refused() -> None:
+            begun_s.append(clock.monotonic_s())
+            raise LinkError("nobody there")
+
+        opens = link.open
+        for _ in range(2):
+            begun_s.clear()
+            link.open = refused  # type: ignore[method-assign]
+            link.hang_up()
+            await port.exchange(Poll())
+            await asyncio.sleep(5.0)
+            pauses_s = [b - a for a, b in zip(begun_s, begun_s[1:], strict=False)]
+            assert pauses_s[:6] == pytest.approx([0.1, 0.2, 0.4, 0.8, 1.0, 1.0])
+            link.open = opens  # type: ignore[method-assign]
+            await port.wait_until_up()
+
+    play(story)
+
+
 def test_a_link_counts_as_up_only_when_the_acu_answered_on_it() -> None:
     async def main() -> None:
         clock = LoopClock(START_TAI_S)

@@ -11,7 +11,7 @@ from test_tick import FITTED, NOW, SKY, saw, status
 
 from acu_daemon.cli.virtual_pass import Stage as Rigged
 from acu_daemon.control.fence import READS
-from acu_daemon.control.state import ControlState, Exchange, Observation, Request, Stage
+from acu_daemon.control.state import ControlState, Exchange, Observation, Request, Stage, Watchdog
 from acu_daemon.control.tick import tick
 from acu_daemon.protocol.messages import AcuMode, Command, Nak, Reply, Status, Stop, WriteParameter
 
@@ -65,6 +65,12 @@ def test_the_register_watchdog_is_cleared_again_when_nobody_answered_but_not_for
     cleared = WriteParameter("W", 0)
     assert extras(disarmed, status(AcuMode.STANDBY), None).count(cleared) >= 5
     assert extras(disarmed, status(AcuMode.STANDBY), Nak()).count(cleared) == 1
+
+
+@pytest.mark.parametrize("known", [Watchdog.SET, Watchdog.REFUSED])
+def test_p4_after_a_lost_link_the_register_watchdog_is_asked_for_again_unless_there_is_none(known: Watchdog) -> None:
+    lost = asked(replace(moving(), watchdog=known))
+    assert lost.watchdog is (Watchdog.UNKNOWN if known is Watchdog.SET else known)
 
 
 # In flight
@@ -136,5 +142,20 @@ def test_p4_started_again_after_a_crash_and_ended_at_once_it_stops_what_the_one_
         service, task = rig.service, rig.task
         rig.end_and_run_again()
         assert rig.service is not service
+        assert rig.acu.status().mode is AcuMode.STANDBY
+        assert task.result().is_stopped
+
+
+def test_p4_started_again_without_a_link_and_ended_it_stops_what_the_one_before_has_left_once_it_has_one(
+    tmp_path: Path,
+) -> None:
+    with Rig(tmp_path, demo_scene()) as rig:
+        rig.wait(6.0)
+        rig.fault("refuse duration_s=4")
+        rig.crash(0.0)
+        rig.wait(0.5)
+        assert rig.acu.status().mode is AcuMode.AUTOTRACK
+        task = rig.task
+        rig.end_and_run_again()
         assert rig.acu.status().mode is AcuMode.STANDBY
         assert task.result().is_stopped
