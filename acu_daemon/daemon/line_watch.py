@@ -30,6 +30,8 @@ class LineWatch:
             self._is_poor, self.alarm = False, ""
             return
         counts = (port.failed_exchange_count, port.garbled_count, port.discarded_count, self._doubt.count)
+        if self._counts and sum(counts) < self._counts[-1]:
+            self._counts.clear()  # another connection counts from zero
         self._counts.append(sum(counts))
         bad_count = self._counts[-1] - self._counts[0]
         if bad_count >= POOR_COUNT:
