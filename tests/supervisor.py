@@ -14,6 +14,9 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
+from script_modules import load
+
+process_load = load("process_load")
 UNIT = Path(__file__).resolve().parents[1] / "config" / "systemd" / "acu-daemon@.service"
 UNITS_S = {"ms": 1e-3, "s": 1.0, "": 1.0, "min": 60.0}
 PATIENCE_S = 60.0
@@ -89,7 +92,11 @@ class Supervisor:
             for left in self._runtime.iterdir():
                 left.unlink()
             command = [*self._command("ExecStart"), *self._more]
-            self.process = subprocess.Popen(command, env=self._environment, stdout=self._log, stderr=self._log)
+            self.process = subprocess.Popen(
+                command, env=self._environment, stdout=self._log, stderr=self._log, start_new_session=True
+            )
+            if not process_load.try_nice(self.process.pid, int(self._unit["Nice"][-1])):
+                self._log.write(b"supervisor: the unit's niceness is not permitted to this user\n")
             self.starts_s.append(time.monotonic())
             result = self._watch(self.process)
             if result == "success" and not self._is_stopping.is_set():
