@@ -151,10 +151,11 @@ def test_p4_started_again_without_a_link_and_ended_it_stops_what_the_one_before_
 ) -> None:
     with Rig(tmp_path, demo_scene()) as rig:
         rig.wait(6.0)
-        rig.fault("refuse duration_s=4")
         rig.crash(0.0)
+        rig.link.is_cut = True
         rig.wait(0.5)
-        assert rig.acu.status().mode is AcuMode.AUTOTRACK
+        assert rig.service.snapshot().az_deg is None
+        rig.loop.call_later(2.0, setattr, rig.link, "is_cut", False)
         task = rig.task
         rig.end_and_run_again()
         assert rig.acu.status().mode is AcuMode.STANDBY
