@@ -14,7 +14,7 @@ from conftest import DATA, needs_data
 
 from acu_daemon.config import load_satellite, load_station
 from acu_daemon.edge.elements_file import LoadedElements, load_elements
-from acu_daemon.errors import ElementsError
+from acu_daemon.errors import ElementsError, UsageError
 from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.units import DAY_S
 
@@ -54,6 +54,13 @@ def refusal(directory: Path, satellite: str, elements: str | bytes = ISS) -> str
 
 def tle(name: str, norad_id: int | None = None) -> str:
     return from_file(name, "tle", "../lists/active.txt", norad_id)
+
+
+def test_a_file_in_which_everybody_may_write_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    assert load(tmp_path, tle("ISS (ZARYA)")).label
+    (tmp_path / "lists" / "active.txt").chmod(0o666)
+    with pytest.raises(UsageError, match=r"active\.txt: everybody may write there; close it: chmod o-w"):
+        load(tmp_path, tle("ISS (ZARYA)"))
 
 
 def test_the_file_is_relative_to_the_satellites_toml(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from acu_daemon.config_tables import BrouwerSection, ElementsFileSection, SatelliteFile
+from acu_daemon.edge.state import refuse_world_writable
 from acu_daemon.errors import ElementsError
 from acu_daemon.model import EarthOrientation
 from acu_daemon.orbit.brouwer import BrouwerElements, BrouwerPropagator
@@ -150,6 +151,7 @@ def _from_ephemeris(
 
 def _read(section: ElementsFileSection, toml_path: Path) -> tuple[Path, str]:
     path = toml_path.parent / section.file
+    refuse_world_writable(path)
     try:
         return path, path.read_text(encoding="utf-8", errors="replace")
     except OSError as error:
