@@ -90,7 +90,7 @@ class AcuSection(Section):
     elevation: ElevationSection
     dialect: Literal["sa3842"] = "sa3842"
     address: Annotated[str, BeforeValidator(_address)] = "1"
-    period_s: float = Field(default=0.1, ge=0.1, le=0.2)  # more, and one lost reply is half a second of silence
+    period_s: float = Field(default=0.1, ge=0.1, le=0.15)  # six readings must show a rate, one lost reply no lost link
     device_delay_s: float = Field(default=0.010, ge=0, le=0.1)
 
 

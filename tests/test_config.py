@@ -122,7 +122,7 @@ STATION_MISTAKES = [
     ("max_deg = 90.0", "max_deg = 270.0", "acu.elevation.max_deg = 270.0: expected at most 180"),
     ("max_rate_deg_s = 5.0", "max_rate_deg_s = 0", "acu.elevation.max_rate_deg_s = 0: expected more than 0"),
     ("[acu]", "[acu]\nperiod_s = 0.01", "acu.period_s = 0.01: expected at least 0.1"),
-    ("[acu]", "[acu]\nperiod_s = 0.3", "acu.period_s = 0.3: expected at most 0.2"),
+    ("[acu]", "[acu]\nperiod_s = 0.2", "acu.period_s = 0.2: expected at most 0.15"),
     ("[acu]", '[acu]\ndialect = "x"', "acu.dialect = \"x\": expected 'sa3842'"),
     ("[acu]", "[acu]\naddress = 12", "acu.address = 12: '12' is not an ACU address, expected one character"),
     ("tcp://127.0.0.1:3842", "tcp://127.0.0.1", 'acu.url = "tcp://127.0.0.1": link'),

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from acu_daemon.control.absorb import RATE_READINGS
 from acu_daemon.control.gate import LIMIT_SLACK_DEG, gate
 from acu_daemon.control.state import ControlConfig, ControlState
 from acu_daemon.model import AxisLimits, Pointing
@@ -127,3 +128,14 @@ def test_registers_that_begin_beside_a_moving_path_come_onto_it_and_not_only_to_
         passed = gate(path, state, 0.0, is_followed=True, dt_s=DT_S, config=CONFIG)
         state = replace(at(passed.az.position_deg, passed.el.position_deg), axis_az=passed.az, axis_el=passed.el)
     assert passed.az.position_deg == pytest.approx(path.az_deg, abs=RATE_TOLERANCE_DEG)
+
+
+@pytest.mark.parametrize("period_s", [0.1, 0.15])  # the shortest and the longest that station.toml allows
+def test_the_antennas_own_rate_is_known_at_every_period(period_s: float) -> None:
+    """An antenna that comes at 10 deg/s to a register that it is about to follow is met where it will be."""
+    readings = tuple((period_s * k, 100.0 + 10.0 * period_s * k, 45.0) for k in range(RATE_READINGS))
+    now_s = readings[-1][0] + period_s
+    state = replace(at(readings[-1][1], 45.0), axis_az=None, axis_el=None, track_of_readings=readings)
+    here = Pointing(100.0 + 10.0 * now_s, 45.0, 0.0, 0.0)
+    passed = gate(here, state, now_s, is_followed=True, dt_s=period_s, config=CONFIG)
+    assert passed.az.position_deg == pytest.approx(here.az_deg, abs=RATE_TOLERANCE_DEG)
