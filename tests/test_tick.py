@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from acu_daemon.control.absorb import REFUSED_EXTRA_S, REFUSED_PAUSE_S
 from acu_daemon.control.causes import LINK_SILENCE_S
+from acu_daemon.control.fence import fence
 from acu_daemon.control.state import (
     ControlConfig,
     ControlState,
@@ -37,6 +38,7 @@ from acu_daemon.protocol.messages import (
     SelectBackup,
     SelectMode,
     Status,
+    Stow,
     WriteAndPoll,
     WriteRegisters,
 )
@@ -121,7 +123,7 @@ def test_a_late_tick_aims_for_the_moment_it_really_writes() -> None:
 
 @pytest.mark.parametrize(("gap_s", "is_learned"), [(0.1, True), (0.13, False), (0.2, False)])
 def test_a_lag_is_learned_only_from_writes_that_come_a_period_apart(gap_s: float, is_learned: bool) -> None:
-    """The stairs of a daemon that gets no processor, or of a line in trouble, are not those that the lag is read from."""
+    """The stairs of a daemon without a processor, or of a line in trouble, are not those that the lag is read from."""
     state = replace(ready(TrackState.HOLD_FITTED, status(AcuMode.REMOTE_BACKUP)), hold_from_tai_s=NOW)
     for k in range(30):
         now_tai_s = NOW + k * gap_s
@@ -260,6 +262,32 @@ def test_a_stow_from_elsewhere_ends_every_active_state_and_nothing_leaves_it(tra
 # Refusals
 
 
+def test_p5_what_the_gate_refuses_is_counted_every_time_and_logged_once() -> None:
+    held = status(AcuMode.REMOTE_BACKUP)
+    beyond = replace(FITTED, prediction=replace(path("FITTED"), el_deg=path().el_deg + 60.0))
+    state, events = replace(ready(TrackState.HOLD_FITTED, held), hold_from_tai_s=NOW), []
+    for k, sky in enumerate([beyond, beyond, FITTED, beyond]):
+        state, orders = tick(state, saw(held), sky, NOW + 0.1 * k, CONFIG)
+        events.append([event.fields["reason"] for event in orders.events if event.name == "gate.refused"])
+    assert state.gate_refusal_count == 3
+    assert events == [["elevation outside 0 to 90 deg"], [], [], ["elevation outside 0 to 90 deg"]]
+
+
+def test_p5_what_the_gate_holds_back_is_counted() -> None:
+    held = status(AcuMode.REMOTE_BACKUP)
+    far = replace(FITTED, prediction=replace(path("FITTED"), follow_az_deg=path().az_deg + 3.0))
+    state, _ = tick(ready(TrackState.HOLD_FITTED, held), saw(held), far, NOW, CONFIG)
+    assert (state.gate_clamped_count, state.gate_refusal_count) == (1, 0)
+
+
+def test_p5_what_the_fence_keeps_back_is_counted_and_logged_and_a_poll_goes_in_its_place() -> None:
+    state = ready(TrackState.HOLD_FITTED, status(AcuMode.REMOTE_BACKUP))
+    after, orders = fence(state, Orders(WriteAndPoll(100.0, 91.0), Stow()), CONFIG)
+    assert (orders.first, orders.extra) == (Poll(), None)
+    assert after.gate_refusal_count == 2
+    assert [event.name for event in orders.events] == ["fence.refused", "fence.refused"]
+
+
 def test_one_refused_write_is_not_held_against_the_next_two_are() -> None:
     seen = status()
     state, orders = step(TrackState.AUTOTRACK_FITTED, seen, FITTED, refused=Nak())
@@ -268,6 +296,16 @@ def test_one_refused_write_is_not_held_against_the_next_two_are() -> None:
     assert orders.first == Poll()
     _, orders = tick(state, saw(seen), FITTED, NOW + 0.1 + REFUSED_PAUSE_S + 0.01, CONFIG)
     assert isinstance(orders.first, WriteAndPoll)
+
+
+def test_a_refused_write_is_not_in_force_and_an_answered_one_is() -> None:
+    seen = status()
+    state, orders = step(TrackState.AUTOTRACK_FITTED, seen, FITTED)
+    assert isinstance(orders.first, WriteAndPoll)
+    assert tick(state, saw(seen, refused=Nak()), FITTED, NOW + 0.1, CONFIG)[0].in_force == state.in_force
+    answered, _ = tick(state, saw(seen), FITTED, NOW + 0.1, CONFIG)
+    assert answered.in_force is not None
+    assert answered.in_force[1:] == (orders.first.az_deg, orders.first.el_deg)
 
 
 def extras_over(refusal: Nak | None, span_s: float) -> int:
