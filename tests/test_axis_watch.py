@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acu_daemon.control.axis_watch import AxisSeen, AxisWatch, Bounds, Duty, duty_of, sky_scale, watch_axis
+from acu_daemon.control.axis_watch import AWAY_S, AxisSeen, AxisWatch, Bounds, Duty, duty_of, sky_scale, watch_axis
 from acu_daemon.control.encoder_watch import FROZEN_DEG, EncoderWatch, watch_encoders
 from acu_daemon.model import AxisLimits, Pointing
 from acu_daemon.pointing.axis import AxisState, step
@@ -24,14 +24,14 @@ class Found:
     angle_deg: float
 
 
-def judge(angles_deg, gaps_deg, duty=Duty.FOLLOW, scale=1.0) -> Found | None:
+def judge(angles_deg, gaps_deg, duty=Duty.FOLLOW, scale=1.0, bounds=BOUNDS) -> Found | None:
     """The first complaint about an axis that shows these angles ten times a second."""
     watch, before_deg = AxisWatch(), angles_deg[0]
     for k, (angle_deg, gap_deg) in enumerate(zip(angles_deg, gaps_deg, strict=True)):
         rate_deg_s = (angle_deg - before_deg) / TICK_S
         before_deg = angle_deg
         seen = AxisSeen(TICK_S * k, angle_deg, rate_deg_s, duty, gap_deg, scale)
-        watch, text = watch_axis(watch, seen, LIMITS, BOUNDS)
+        watch, text = watch_axis(watch, seen, LIMITS, bounds)
         if text:
             return Found(text, TICK_S * k, angle_deg)
     return None
@@ -55,6 +55,20 @@ def test_p6_an_axis_that_stands_still_is_found_two_seconds_after_its_command_lef
     assert found is not None
     assert found.text == "stands still away from its command"
     assert found.after_s == pytest.approx(1.0 / abs(rate_deg_s) + 2.0, abs=0.25)
+
+
+@pytest.mark.parametrize("bounds", [Bounds(0.4, 0.6), Bounds(3.0, 5.0)], ids=str)
+def test_p6_angle_and_time_are_those_of_the_configuration(bounds: Bounds) -> None:
+    stands = follow([1.0 * t for t in ticks(20.0)], [0.0 for _ in ticks(20.0)], bounds=bounds)
+    assert stands is not None
+    assert stands.after_s == pytest.approx(bounds.error_deg / 1.0 + bounds.error_s, abs=0.25)
+    away = follow([0.0 for _ in ticks(20.0)], [-2.0 * t for t in ticks(20.0)], bounds=bounds)
+    assert away is not None
+    braking_deg, seen_deg = 2.0**2 / LIMITS.max_acceleration_deg_s2, 2.0 * AWAY_S
+    assert away.angle_deg == pytest.approx(-2.0 * bounds.error_deg - braking_deg - seen_deg, abs=0.7)
+    runs = judge([2.0 * t for t in ticks(20.0)], [None for _ in ticks(20.0)], duty=Duty.STAND, bounds=bounds)
+    assert runs is not None
+    assert runs.after_s == pytest.approx(bounds.error_deg / 2.0 + bounds.error_s, abs=0.25)
 
 
 def test_p6_an_axis_that_turns_the_wrong_way_is_found_within_a_few_degrees() -> None:
