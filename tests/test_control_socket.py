@@ -1,6 +1,7 @@
 """The control channel of a running daemon: who may ask, what is answered, and what is said when nobody is there."""
 
 import asyncio
+import contextlib
 import os
 import socket
 import stat
@@ -9,7 +10,7 @@ from pathlib import Path
 import pytest
 from command_line import acu_daemon
 
-from acu_daemon.edge.control_socket import LONGEST_LINE, SOCKET, ControlSocket, ask
+from acu_daemon.edge.control_socket import LONGEST_LINE, MOST_AT_ONCE, SOCKET, ControlSocket, ask
 from acu_daemon.errors import AcuDaemonError, UsageError
 
 
@@ -71,6 +72,25 @@ async def test_a_daemon_without_its_socket_has_the_directory_still(tmp_path: Pat
         await ControlSocket(tmp_path, answer).open()
     await channel.close()
     await channel.open()
+    await channel.close()
+
+
+async def test_a_crowd_is_let_in_a_few_at_a_time_and_answered(tmp_path: Path) -> None:
+    """So that a tick that falls due meanwhile waits for a few of them and not for all."""
+    channel = ControlSocket(tmp_path, answer)
+    await channel.open()
+    crowd = [socket.socket(socket.AF_UNIX) for _ in range(50)]
+    let_in_count = 0
+    for one in crowd:
+        one.setblocking(False)
+        with contextlib.suppress(BlockingIOError):
+            one.connect(str(tmp_path / SOCKET))
+            let_in_count += 1
+    assert let_in_count <= MOST_AT_ONCE + 1
+    assert await asyncio.gather(*[asked(tmp_path, "disarm") for _ in range(50)]) == ["disarm"] * 50
+    for one in crowd:
+        one.close()
+    await asyncio.sleep(0.01)
     await channel.close()
 
 
