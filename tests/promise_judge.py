@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from flights import LSB_DEG
 
-from acu_daemon.daemon.service import Outcome
+from acu_daemon.daemon.service import FIRST_POLL_S, Outcome
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.edge.carry_over import read_carry_over
 from acu_daemon.edge.run_state import read_run_state
@@ -241,7 +241,10 @@ class Judge:
         """It ends: the ticks are counted, and those with a dead fit too; what is saved can be read."""
         foreground = self._rig.service._foreground
         ticks, skipped = foreground.tick_count, foreground.skipped_tick_count
-        due = (self._now_s - self._started_s) / self._rig.config.period_s
+        ticked_s = self._now_s - self._started_s
+        if self._rig.state.status is None:
+            ticked_s = min(ticked_s, FIRST_POLL_S)  # without an ACU it ends then; what it owes is a stop, no ticks
+        due = ticked_s / self._rig.config.period_s
         is_calm = self._now_s - self._stalled_s > 0.5
         if is_calm and not self._rig.task.done() and abs(ticks + skipped - due) > COUNT_SLACK:
             self._break("P8", f"{ticks} ticks and {skipped} skipped of {due:.0f}")
