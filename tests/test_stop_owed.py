@@ -13,6 +13,7 @@ from acu_daemon.cli.virtual_pass import Stage as Rigged
 from acu_daemon.control.fence import READS
 from acu_daemon.control.state import ControlState, Exchange, Observation, Request, Stage, Watchdog
 from acu_daemon.control.tick import tick
+from acu_daemon.pointing.axis import AxisState
 from acu_daemon.protocol.messages import AcuMode, Command, Nak, Reply, Status, Stop, WriteParameter
 
 T = RISING_TAI_S
@@ -41,6 +42,14 @@ def test_p6_the_stop_of_a_latch_that_was_not_acknowledged_yet_outlives_what_a_pe
 @pytest.mark.parametrize("requests", [(Request.CLEAR,), (Request.DISARM, Request.CLEAR, Request.ARM)])
 def test_cleared_and_armed_the_daemon_goes_on_and_owes_no_stop(requests) -> None:
     assert not asked(latched(), *requests).is_stop_due
+
+
+@pytest.mark.parametrize("request_", [Request.ARM, Request.CLEAR])
+def test_p1_armed_or_cleared_nothing_of_the_registers_before_is_gone_on_from(request_: Request) -> None:
+    before = replace(latched(), axis_az=AxisState(200.0, 5.0), axis_el=AxisState(60.0, 2.0), was_followed=True)
+    before = replace(before, arming=False) if request_ is Request.ARM else before
+    state, _ = tick(before, saw(status(AcuMode.REMOTE), requests=(request_,)), FITTED, NOW, GUARDED)
+    assert (state.axis_az, state.axis_el, state.was_followed) == (None, None, False)
 
 
 def extras(state: ControlState, seen: Status, reply: Reply | None) -> list[Command | None]:
