@@ -2,10 +2,13 @@
 
 from dataclasses import replace
 
+from flights import RISING_TAI_S, climb
 from test_live_line import SEEN
 
 from acu_daemon.daemon.health import FEED_S, Health
 from acu_daemon.daemon.snapshot import Snapshot
+from acu_daemon.protocol.messages import Command, Reply, WriteAndPoll
+from acu_daemon.sim.acu import FakeAcu
 
 ALIVE = "WATCHDOG=1"
 
@@ -54,3 +57,21 @@ def test_p4_with_the_link_down_each_attempt_to_open_it_feeds_the_watchdog_and_no
     tried = [replace(one, attempt_count=k // 10) for k, one in enumerate(down)]
     assert told(*down).count(ALIVE) == 0
     assert told(*tried).count(ALIVE) == 2
+
+
+class Deaf(FakeAcu):
+    """From a moment on it answers polls, and no register write."""
+
+    is_deaf = False
+
+    def answer(self, command: Command) -> Reply | None:
+        reply = super().answer(command)
+        return None if self.is_deaf and isinstance(command, WriteAndPoll) else reply
+
+
+def test_p4_polls_after_writes_that_nobody_answers_are_no_work_done() -> None:
+    flight = climb(14.0, make_acu=Deaf, script=[(10.0, lambda stage: setattr(stage.acu, "is_deaf", True))])
+    done = [seen.answered_count for seen in flight.snapshots if seen.tai_s > RISING_TAI_S + 10.3]
+    assert len(done) > 20
+    assert len(set(done)) == 1
+    assert flight.snapshots[-1].is_link_up

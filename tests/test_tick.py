@@ -153,6 +153,18 @@ def test_without_room_in_the_cycle_an_extra_takes_the_place_of_one_write() -> No
     assert (orders.first, orders.extra) == (SelectBackup(Backup.REMOTE), None)
 
 
+def test_without_room_no_two_writes_in_a_row_give_way() -> None:
+    seen = status(AcuMode.STANDBY, backup_selected=Backup.RATE)
+    state = replace(ready(TrackState.HOLD_FITTED, seen), entered_tai_s=NOW - 1.0, hold_from_tai_s=NOW)
+    state, orders = tick(state, saw(seen, has_room=False), FITTED, NOW, CONFIG)
+    assert orders.first == SelectBackup(Backup.REMOTE)
+    selected = replace(seen, backup_selected=Backup.REMOTE)
+    state, orders = tick(state, saw(selected, has_room=False), FITTED, NOW + 0.1, CONFIG)
+    assert isinstance(orders.first, WriteAndPoll)
+    _, orders = tick(state, saw(selected, has_room=False), FITTED, NOW + 0.2, CONFIG)
+    assert orders.first == SelectMode(AcuMode.AUTOTRACK)
+
+
 def test_with_room_an_extra_goes_beside_the_write() -> None:
     _, orders = step(TrackState.AUTOTRACK_FITTED, status(backup_selected=Backup.RATE), FITTED)
     assert isinstance(orders.first, WriteAndPoll)
