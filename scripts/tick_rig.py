@@ -204,7 +204,9 @@ def _polled(rig: Rig) -> Iterator[list[float]]:
     is_over = threading.Event()
 
     def poll() -> None:
-        while not is_over.wait(POLL_S):
+        next_s = time.monotonic()
+        while not is_over.wait(max(0.0, next_s - time.monotonic())):
+            next_s += POLL_S
             with contextlib.suppress(AcuDaemonError):
                 _status(rig)
                 answered.append(time.monotonic())
