@@ -4,13 +4,17 @@ The real daemon on its state directory, against the fake ACU in virtual time (pr
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from promise_rig import HANDS, Rig, demo_scene
 
 from acu_daemon.edge.latch import DISARMED
 from acu_daemon.edge.run_state import RUN_STATE
+from acu_daemon.protocol.messages import Faults, Status
+from acu_daemon.sim import acu_status
 
 LOCK_S, OUTAGE_S = 8.0, 3.0
 BY_HAND = "another hand that stopped the antenna"
@@ -137,6 +141,39 @@ def test_p4_after_the_register_watchdog_has_tripped_it_holds_again_within_three_
         rig.wait(3.0)
         assert rig.acu.status().has_interlock_fault
         assert (rig.state.disarmed_by, rig.state.track) == ("", "HOLD/FITTED")
+
+
+@pytest.fixture
+def status_without_system_faults(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An ACU that shows the watchdog in FAULT DETAIL alone."""
+
+    def status_of(antenna: Any, modes: Any, faults: Faults, **others: Any) -> Status:
+        return acu_status.status_of(antenna, modes, replace(faults, system=0), **others)
+
+    monkeypatch.setattr("acu_daemon.sim.acu.status_of", status_of)
+
+
+@pytest.mark.usefixtures("status_without_system_faults")
+@pytest.mark.parametrize("trip", [trip_by_crash, trip_by_line])
+def test_p4_a_watchdog_that_shows_in_the_fault_detail_alone_is_nobodys_stop(
+    rig: Rig, trip: Callable[[Rig], None]
+) -> None:
+    for _ in range(2):
+        trip(rig)
+        rig.wait(3.0)
+        assert not rig.acu.status().has_interlock_fault
+        assert (rig.state.disarmed_by, rig.state.track) == ("", "HOLD/FITTED")
+
+
+@pytest.mark.usefixtures("status_without_system_faults")
+@pytest.mark.parametrize("trip", [trip_by_crash, trip_by_line])
+def test_p1_a_stop_in_a_long_outage_is_respected_once_the_fault_detail_shows_no_watchdog(
+    rig: Rig, trip: Callable[[Rig], None]
+) -> None:
+    meanwhile(rig, "stop")
+    trip(rig)
+    rig.wait(3.0)
+    assert rig.state.disarmed_by == BY_HAND
 
 
 def test_p1_with_the_watchdogs_bit_still_standing_a_stop_in_a_short_outage_is_respected(rig: Rig) -> None:

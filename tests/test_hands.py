@@ -25,6 +25,7 @@ from acu_daemon.protocol.messages import (
     Poll,
     ReadFaults,
     ReadParameter,
+    Reply,
     ResetFault,
     SelectBackup,
     SelectMode,
@@ -52,7 +53,8 @@ def moving(track: TrackState = TrackState.HOLD_FITTED, mode: AcuMode = AcuMode.R
 def run(
     state: ControlState, seen: Status, count: int = 1, config=GUARDED, **first
 ) -> tuple[ControlState, list[Command]]:
-    """Ticks against an ACU that acknowledges STOP; returns all that was sent."""
+    """Ticks against an ACU that acknowledges STOP, says who it is and knows no fault; returns all that was sent."""
+    replies = {Identify(): Identity("3842", "S1"), ReadFaults(): Faults()}
     sent: list[Command] = []
     extra = first.pop("extra", None)
     for k in range(count):
@@ -60,7 +62,7 @@ def run(
         observed = replace(observed, reading=replace(observed.reading, tai_s=NOW + 0.1 * k))
         state, orders = tick(state, observed, FITTED, NOW + 0.1 * (k + 1), config)
         sent += [command for command in (orders.first, orders.extra) if command is not None]
-        extra = Exchange(orders.extra, Ack()) if orders.extra is not None else None
+        extra = Exchange(orders.extra, replies.get(orders.extra, Ack())) if orders.extra is not None else None
     return state, sent
 
 
@@ -245,6 +247,27 @@ def test_p1_a_stop_while_the_daemon_was_dead_disarms_it() -> None:
 )
 def test_p4_after_a_crash_it_goes_on_where_the_acu_shows_its_own_doing(seen: Status, held: Held | None) -> None:
     assert started_again(seen, held)[0].is_armed(GUARDED)
+
+
+@pytest.mark.parametrize(
+    ("reply", "is_armed", "is_settled"),
+    [
+        (Faults(system=2), True, True),
+        (Faults(system=1), False, True),
+        (Nak(), False, True),
+        (Ack(), True, False),
+        (None, True, False),
+    ],
+)
+def test_p1_p4_where_the_status_shows_no_watchdog_nothing_is_sent_until_the_fault_detail_tells(
+    reply: Reply | None, is_armed: bool, is_settled: bool
+) -> None:
+    state = replace(moving(), in_force=(NOW - 6.0, 100.0, 40.0))
+    state, sent = run(state, status(AcuMode.STANDBY))
+    assert (state.is_stop_doubted, sent) == (True, [Poll(), ReadFaults()])
+    state, sent = run(state, status(AcuMode.STANDBY), extra=Exchange(ReadFaults(), reply))
+    assert (state.is_armed(GUARDED), state.is_stop_doubted) == (is_armed, not is_settled)
+    assert is_settled or sent == [Poll()]
 
 
 def test_p1_a_stow_while_the_daemon_was_dead_is_kept() -> None:

@@ -12,13 +12,15 @@ from acu_daemon.control.axis_watch import AxesWatch, AxisSeen, duty_of, sky_scal
 from acu_daemon.control.start import WATCHDOG
 from acu_daemon.control.state import ControlConfig, ControlState, Event, Held, Observation, Request, Stage, Watchdog
 from acu_daemon.control.states import ACTIVE, TrackState
-from acu_daemon.protocol.messages import AcuMode, Backup, Command, Faults, ReadFaults, Status, Stop, WriteParameter
+from acu_daemon.protocol.messages import AcuMode, Backup, Command, Faults, Nak, ReadFaults, Status, Stop, WriteParameter
 from acu_daemon.units import wrap_180
 
 NO_STOP_MODES = (AcuMode.MANUAL, AcuMode.STOWING, AcuMode.STOWED, AcuMode.FAULT)  # a stop would disturb, or do nothing
 STOPPED_FROM = (AcuMode.REMOTE, AcuMode.ACQUIRE, AcuMode.AUTOTRACK, AcuMode.REMOTE_BACKUP)
+ANOTHER_HAND = "another hand that stopped the antenna"
 RATE_SPAN_S = 1.0
 EMERGENCY_STOP, DOOR_OPEN = 1, 2  # of the interlock nibble, ICD section 4
+WATCHDOG_TRIPPED = 2  # of the system nibble
 
 
 def obey(state: ControlState, requests: Iterable[Request], config: ControlConfig, events: list[Event]) -> ControlState:
@@ -29,7 +31,7 @@ def obey(state: ControlState, requests: Iterable[Request], config: ControlConfig
             is_stop_due = state.is_stop_due and not state.is_armed(config)
             state = replace(_anew(state), latch="", is_stop_due=is_stop_due)
         elif request is Request.ARM and not config.is_shadow:
-            state = replace(state, held=None)  # whoever says so has seen how the antenna stands
+            state = replace(state, held=None, is_stop_doubted=False)  # whoever says so has seen how the antenna stands
             if not state.is_armed(config):
                 events.append(Event("armed"))
                 is_stop_due = state.is_stop_due and bool(state.latch)
@@ -51,6 +53,7 @@ def _anew(state: ControlState) -> ControlState:
         was_followed=False,
         axes=AxesWatch(),
         watchdog=state.watchdog if state.watchdog is Watchdog.REFUSED else Watchdog.UNKNOWN,
+        is_stop_doubted=False,
     )
 
 
@@ -64,7 +67,8 @@ def respect_stop(before: ControlState, state: ControlState, config: ControlConfi
     """Take STANDBY where the daemon held the antenna for a STOP by another hand, unless the ACU did it itself.
 
     Held before a lost link, a hang or a crash counts as well.  Sign of a power cycle: the backup is forgotten.  Of the
-    register watchdog: its fault bit.  That stays until it is reset; where it stood already, time must tell.
+    register watchdog: its fault bit.  That stays until it is reset; where it stood already, time must tell.  Where the
+    status does not show it, but time would have been, it is doubted until FAULT DETAIL tells.
     before: the memory one tick ago.
     """
     now, held = state.status, state.held
@@ -74,10 +78,22 @@ def respect_stop(before: ControlState, state: ControlState, config: ControlConfi
     is_stopped = is_stopped and now.is_remote_enabled  # else it is the local panel's, and ends with it
     unwritten_s = inf if before.in_force is None else state.reading.tai_s - before.in_force[0]
     is_new_fault = now.has_interlock_fault and not held.has_interlock_fault
-    may_be_watchdog = now.has_interlock_fault and 0.0 < config.register_watchdog_s <= unwritten_s
-    if is_stopped and not is_new_fault and not may_be_watchdog and state.is_armed(config) and not state.latch:
-        return _disarm(state, "another hand that stopped the antenna", events)
-    return state
+    may_be_watchdog = 0.0 < config.register_watchdog_s <= unwritten_s
+    if not is_stopped or is_new_fault or not state.is_armed(config) or state.latch:
+        return replace(state, is_stop_doubted=False)
+    if may_be_watchdog:
+        return replace(state, is_stop_doubted=not now.has_interlock_fault)
+    return _disarm(state, ANOTHER_HAND, events)
+
+
+def settle_doubt(state: ControlState, seen: Observation, events: list[Event]) -> ControlState:
+    """Take the answer of FAULT DETAIL: the register watchdog has tripped, or another hand has stopped the antenna."""
+    if not state.is_stop_doubted or seen.extra is None or seen.extra.command != ReadFaults():
+        return state
+    reply = seen.extra.reply  # FAULT DETAIL is answered always; an ACU that refuses it knows no such bit
+    if isinstance(reply, Faults) and reply.system & WATCHDOG_TRIPPED:
+        return replace(state, is_stop_doubted=False, held=None)
+    return _disarm(state, ANOTHER_HAND, events) if isinstance(reply, Faults | Nak) else state
 
 
 def note_held(state: ControlState, config: ControlConfig) -> ControlState:
@@ -85,7 +101,7 @@ def note_held(state: ControlState, config: ControlConfig) -> ControlState:
     status = state.status
     if not state.is_armed(config) or state.latch:
         return replace(state, held=None)
-    if status is None or state.track is TrackState.LINK_LOST:
+    if status is None or state.track is TrackState.LINK_LOST or state.is_stop_doubted:
         return state
     is_held = state.track in ACTIVE if state.stage is Stage.READY else state.held is not None
     has_fault = status.has_interlock_fault
@@ -106,8 +122,12 @@ def respect_interlock(
 
 
 def question(state: ControlState) -> Command | None:
-    """Ask what a fault is, until it is answered, and again when its bits change."""
-    if state.track is not TrackState.FAULT or state.stage is Stage.NEW or state.status is None:
+    """Ask what a fault is, until it is answered, again when its bits change; and what put the antenna in STANDBY."""
+    if state.stage is Stage.NEW or state.status is None:
+        return None
+    if state.is_stop_doubted:
+        return ReadFaults()
+    if state.track is not TrackState.FAULT:
         return None
     return ReadFaults() if state.faults_read != _faults(state.status) else None
 

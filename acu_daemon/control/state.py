@@ -127,6 +127,7 @@ class ControlState:
     is_stop_due: bool = False  # STOP is sent until it is acknowledged
     in_force: tuple[float, float, float] | None = None  # the last accepted write: time, continuous azimuth, elevation
     held: Held | None = None  # None: it does not hold the antenna; kept through lost links and restarts
+    is_stop_doubted: bool = False  # found in STANDBY, by a hand or by the register watchdog: FAULT DETAIL tells
     watchdog: Watchdog = Watchdog.UNKNOWN
     watchdog_try_count: int = 0
     axes: AxesWatch = AxesWatch()

@@ -20,6 +20,7 @@ from acu_daemon.control.hands import (
     question,
     respect_interlock,
     respect_stop,
+    settle_doubt,
     watch_antenna,
 )
 from acu_daemon.control.modes import wanted_mode_command
@@ -56,7 +57,7 @@ def tick(
     before = state
     state = absorb(state, seen, sky, now_tai_s, config, events)
     state = obey(state, seen.requests, config, events)
-    state = respect_stop(before, state, config, events)
+    state = settle_doubt(respect_stop(before, state, config, events), seen, events)
     state = respect_interlock(state, seen, config, events)
     state = let_be(watch_antenna(state, seen, config, events))
     state = note_held(_walk(state, seen, sky, now_tai_s, config, events), config)
@@ -95,6 +96,7 @@ def _may_write(state: ControlState, now_tai_s: float, config: ControlConfig) -> 
         state.is_armed(config)
         and not state.latch
         and not state.is_stop_due
+        and not state.is_stop_doubted
         and state.stage is Stage.READY
         and state.status is not None
         and state.status.is_remote_enabled
