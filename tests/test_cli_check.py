@@ -274,6 +274,21 @@ def test_manual_arming_and_a_free_running_clock_are_warned_of(tmp_path: Path, mo
     assert last(done) == "WARN: ready, with warnings"
 
 
+def test_a_latch_and_a_disarm_of_the_last_run_are_told_before_the_next(tmp_path: Path) -> None:
+    left = tmp_path / "state"
+    left.mkdir()
+    (left / "disarmed").touch()
+    with acu() as small:
+        asked = ("check", "--config", write(tmp_path, station(small.url), scd=BROUWER), "--state", left)
+        disarmed = acu_daemon(*asked)
+        (left / "latch").touch()
+        latched = acu_daemon(*asked)
+    assert (disarmed.code, lines(disarmed)["disarmed"][0]) == (0, "WARN")
+    assert "acu-daemon arm" in lines(disarmed)["disarmed"][1]
+    assert (latched.code, lines(latched)["latch"][0]) == (1, "NO-GO")
+    assert "acu-daemon clear" in lines(latched)["latch"][1]
+
+
 def test_a_directory_without_satellites_or_files_is_no_go(tmp_path: Path) -> None:
     nothing = acu_daemon("check", "--config", tmp_path)
     assert nothing.code == 1

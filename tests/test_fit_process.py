@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -15,6 +16,7 @@ import pytest
 from acu_daemon.assist.estimator import ESTIMATORS, EstimatorSettings
 from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup
 from acu_daemon.edge.fit import FitFailedError, InlineFitRunner, ProcessFitRunner
+from acu_daemon.edge.fit_child import LENGTH
 from acu_daemon.model import AxisLimits, Correction, Readings
 from acu_daemon.orbit.look import look_at
 
@@ -201,6 +203,16 @@ def test_the_child_is_nice_however_its_parent_is(daemons: int, childs: int) -> N
     if "PermissionError" in done.stderr:
         pytest.skip(f"only root may make a process {daemons}")
     assert done.stdout == f"{childs}\n"
+
+
+def test_what_a_library_prints_in_the_child_is_no_reply() -> None:
+    code = "import acu_daemon.edge.fit_child as c; import acu_daemon.control.refit as r; r.Refitter = print; c.serve()"
+    greeting = pickle.dumps("a library says hello")
+    done = subprocess.run(
+        [sys.executable, "-c", code], input=LENGTH.pack(len(greeting)) + greeting, capture_output=True, check=False
+    )
+    assert done.stdout == b""
+    assert b"a library says hello" in done.stderr
 
 
 def loaded_by(module: str) -> set[str]:

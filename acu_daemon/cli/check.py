@@ -14,6 +14,7 @@ from acu_daemon.cli.options import Config, Target, ending, load_target, not_cove
 from acu_daemon.config import load_station, satellite_names
 from acu_daemon.control.plan import plan_pass
 from acu_daemon.edge.clock import SystemClock, is_clock_synchronised
+from acu_daemon.edge.latch import ADVICE, DISARMED, LATCH
 from acu_daemon.edge.link import check_rate, make_link
 from acu_daemon.edge.state import SNAPSHOT, state_directory
 from acu_daemon.errors import AcuDaemonError, LinkError, OrbitError, UsageError
@@ -52,7 +53,7 @@ def command(
     running: Annotated[
         bool, typer.Option("--running", help="Only look whether the daemon that runs here ticks (for health checks).")
     ] = False,
-    state: Annotated[Path | None, typer.Option("--state", metavar="DIR", help="The running daemon's --state.")] = None,
+    state: Annotated[Path | None, typer.Option("--state", metavar="DIR", help="The daemon's --state.")] = None,
 ) -> None:
     """Check everything a pass needs: files, clock, elements, next pass, cable wrap, link, ACU.  Moves nothing.
 
@@ -60,7 +61,7 @@ def command(
     """
     now_tai_s = SystemClock().tai_s() if at is None else parse_utc("--at", at)
     worst = GO
-    for finding in [_running(state)] if running else _findings(config, satellite, now_tai_s):
+    for finding in [_running(state)] if running else _findings(config, satellite, now_tai_s, state):
         typer.echo(f"{finding.verdict:6} {finding.what:22} {'; '.join(finding.detail.splitlines())}")
         if finding.verdict == NO_GO or (finding.verdict == WARN and worst == GO):
             worst = finding.verdict
@@ -69,7 +70,7 @@ def command(
         raise typer.Exit(1)
 
 
-def _findings(config: Path, satellite: str | None, now_tai_s: float) -> Iterator[Finding]:
+def _findings(config: Path, satellite: str | None, now_tai_s: float, state: Path | None) -> Iterator[Finding]:
     try:
         station = load_station(config)
     except UsageError as error:
@@ -78,6 +79,7 @@ def _findings(config: Path, satellite: str | None, now_tai_s: float) -> Iterator
     yield Finding(GO, "station.toml", f"{station.station.name}, ACU at {station.acu.url}")
     if station.safety.arm == "manual":
         yield Finding(WARN, "arming", '[safety] arm = "manual": the daemon writes nothing until a person arms it')
+    yield from _left_behind(state_directory(state, is_rehearsal=False))
     yield clock_finding()
     names = [satellite] if satellite else satellite_names(config)
     if not names:
@@ -94,6 +96,13 @@ def _findings(config: Path, satellite: str | None, now_tai_s: float) -> Iterator
     yield from asyncio.run(_acu(station.acu.url, address_byte(station.acu.address)))
 
 
+def _left_behind(directory: Path) -> Iterator[Finding]:
+    """What of the last run forbids the next one to move."""
+    for verdict, name in ((NO_GO, LATCH), (WARN, DISARMED)):
+        if (directory / name).exists():
+            yield Finding(verdict, name, f"{directory / name} is there: {ADVICE[name]}")
+
+
 def _running(state: Path | None) -> Finding:
     path = state_directory(state, is_rehearsal=False) / SNAPSHOT
     try:
@@ -107,11 +116,11 @@ def _running(state: Path | None) -> Finding:
 
 
 def _alarms(snapshot: Path) -> list[str]:
-    """What a person should see to: a latched axis, a daemon that was disarmed, the clock, an encoder."""
+    """What a person should see to: a latched axis, a daemon that was disarmed, the clock, an encoder, a disk."""
     try:
         seen = json.loads(snapshot.read_text(encoding="utf-8"))
         latch, disarmed_by = seen.get("latch", ""), seen.get("disarmed_by", "")
-        others = [seen.get("clock_alarm", ""), seen.get("encoder_problem", "")]
+        others = [seen.get(name, "") for name in ("clock_alarm", "encoder_problem", "files_alarm")]
     except (OSError, ValueError, AttributeError):
         return []
     texts = [latch and f"latched: {latch}", disarmed_by and f"disarmed by {disarmed_by}", *others]

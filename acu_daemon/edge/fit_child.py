@@ -42,6 +42,8 @@ def be_nice() -> None:
 def serve() -> None:
     """Serve requests until the parent closes the pipe."""
     be_nice()
+    replies = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a library prints is no reply
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a Ctrl-C is for the daemon, which ends the child itself
     gc.disable()  # what is loaded is no garbage
     import numpy as np
@@ -59,8 +61,8 @@ def serve() -> None:
         except (OrbitError, ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
             reply = f"the fit failed: {error}"
         data = pickle.dumps(reply, protocol=pickle.HIGHEST_PROTOCOL)
-        sys.stdout.buffer.write(LENGTH.pack(len(data)) + data)
-        sys.stdout.buffer.flush()
+        replies.write(LENGTH.pack(len(data)) + data)
+        replies.flush()
 
 
 if __name__ == "__main__":
