@@ -1,6 +1,7 @@
 """Which status is believed: what contradicts itself, or outruns its drive, only when the next one agrees."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from fake_sky import AZIMUTH, ELEVATION
@@ -16,6 +17,7 @@ from flights import (
 from flights import RISING_TAI_S as T
 from hypothesis import given
 from hypothesis import strategies as st
+from promise_rig import Rig, demo_scene
 
 from acu_daemon.control.doubt import Doubt, contradictions
 from acu_daemon.protocol.messages import AcuMode, Backup, Command, SelectBackup, SelectMode, Status, Stow
@@ -122,6 +124,26 @@ def test_after_a_silence_an_antenna_may_be_anywhere_its_drive_reaches() -> None:
     assert told(HOLDING, replace(HOLDING, az_deg=190.0), apart_s=4.0) == [True, True]
 
 
+@pytest.mark.parametrize(
+    ("statuses", "apart_s", "is_confirmed"),
+    [
+        ([HOLDING], 0.1, False),
+        ([HOLDING, HOLDING], 0.1, True),
+        ([HOLDING, HOLDING], 4.0, False),
+        ([replace(HOLDING, az_deg=190.0), HOLDING], 0.1, False),
+        ([HOLDING, replace(HOLDING, az_deg=102.0)], 0.1, False),  # the drive can do that, and so can a garbled digit
+        ([replace(HOLDING, az_deg=190.0), HOLDING, HOLDING], 0.1, True),
+    ],
+)
+def test_p2_after_a_silence_a_place_is_sure_once_two_in_a_row_agree(
+    statuses: list[Status], apart_s: float, is_confirmed: bool
+) -> None:
+    doubt = Doubt(AZIMUTH, ELEVATION)
+    for i, status in enumerate(statuses):
+        doubt.believes(status, 1000.0 + i * apart_s)
+    assert doubt.is_confirmed is is_confirmed
+
+
 @given(st.floats(-20.0, 20.0), st.floats(-5.0, 5.0), st.floats(-89.0, 89.0))
 def test_no_motion_that_the_drive_can_make_is_doubted(az_deg_s: float, el_deg_s: float, el_deg: float) -> None:
     path = [
@@ -144,3 +166,16 @@ def test_a_loss_is_held_on_a_line_whose_garble_the_check_byte_does_not_see(seed:
     )
     assert worst_error_deg(flight, T + 12.0, T + 23.0) < 0.1
     assert flight.states()[-1] == "AUTOTRACK/FITTED"
+
+
+@pytest.mark.parametrize("seed", [2, 13, 15])
+def test_p2_the_first_write_after_an_outage_is_no_garbled_place(tmp_path: Path, seed: int) -> None:
+    """Four replies in five are garbled so that the check byte fits: one status alone was written before."""
+    with Rig(tmp_path, demo_scene()) as rig:
+        rig.wait(6.0)
+        rig.fault("silence")
+        rig.wait(1.0)
+        rig.fault("cut duration_s=3")
+        rig.fault(f"xor-blind probability=0.8 duration_s=6 seed={seed}")
+        rig.wait(8.0)
+        assert not rig.judge.broken, rig.judge.broken

@@ -73,7 +73,7 @@ def status(**changes: object) -> Status:
 
 def standing(az_deg: float = AZ_DEG, el_deg: float = EL_DEG, *, is_remote_enabled: bool = True) -> ControlState:
     seen = replace(status(), az_deg=az_deg % 360.0, el_deg=el_deg, is_remote_enabled=is_remote_enabled)
-    return ControlState(status=seen, az_deg=az_deg)
+    return ControlState(status=seen, az_deg=az_deg, is_place_sure=True)
 
 
 def step(state: ControlState, reply: Reply | None, command: Command) -> ControlState:
@@ -124,6 +124,13 @@ def test_under_local_control_it_waits_before_the_first_write() -> None:
     assert acu.count == 0
     remote = replace(state, status=status())
     assert start(remote, acu).stage is Stage.READY
+
+
+def test_p1_the_present_angles_of_a_single_status_are_not_written() -> None:
+    acu = SmallAcu()
+    state = start(replace(standing(), is_place_sure=False), acu)
+    assert (state.stage, acu.count) == (Stage.SECTOR_FREE, 0)
+    assert start(replace(state, is_place_sure=True), acu).stage is Stage.READY
 
 
 def test_p1_without_any_status_nothing_is_written() -> None:

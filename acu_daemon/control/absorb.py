@@ -29,6 +29,7 @@ def absorb(
     if seen.status is not None and seen.reading is not None:
         state = _absorb_in_force(state, seen)
         state = _absorb_reading(state, seen.status, seen.reading, config)
+        state = replace(state, is_place_sure=seen.is_confirmed)
         state = _absorb_offset(state, sky, seen.reading)
         state = _absorb_encoders(state, sky, seen.status, seen.reading, events)
     if seen.extra is not None:

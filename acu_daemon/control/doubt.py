@@ -13,6 +13,7 @@ from acu_daemon.units import wrap_180
 MOVED_COUNT, CONTRADICTING_COUNT = 2, 5  # in a row, before they are believed
 SLACK_DEG = 1.0  # on the sky: noise, and more is left to the gate of readings
 RATE_MARGIN = 1.5  # of the drive's rate
+CONFIRMED_S = 0.5  # between two that confirm each other
 BACKUP_MODES = (AcuMode.RATE_MEMORY, AcuMode.POSITION_MEMORY, AcuMode.REMOTE_BACKUP)
 SELECTED_MODES = (AcuMode.ACQUIRE, AcuMode.AUTOTRACK)  # autotrack is selected in these, and in the backup modes
 DESELECTED_MODES = (AcuMode.STANDBY, AcuMode.MANUAL, AcuMode.REMOTE, AcuMode.STOWING, AcuMode.STOWED, AcuMode.FAULT)
@@ -45,11 +46,17 @@ class Doubt:
         self._believed: tuple[float, Status] | None = None
         self._doubted: tuple[float, Status] | None = None
         self._agreeing_count = 0
+        self._last: tuple[float, Status] | None = None
+        self.is_confirmed = False  # the last status, by the one just before it: after a silence one alone proves little
         self.count = 0
         self.reason = ""
 
     def believes(self, status: Status, tai_s: float) -> bool:
         """Judge the next status, sampled at an instant; the reason of a doubt is in `reason`."""
+        last, self._last = self._last, (tai_s, status)
+        self.is_confirmed = (
+            last is not None and tai_s - last[0] <= CONFIRMED_S and not self._moved(last, status, last[0])
+        )
         wrong = contradictions(status)
         self.reason = f"contradicts itself: {', '.join(wrong)}" if wrong else self._moved(self._believed, status, tai_s)
         if not self.reason:

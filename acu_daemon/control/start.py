@@ -43,7 +43,7 @@ def next_command(state: ControlState, config: ControlConfig) -> Command | None:
     if state.stage is Stage.REGISTERS_KNOWN:
         return WriteParameter(SECTOR, 0) if state.last_extra == ReadParameter(SECTOR) else ReadParameter(SECTOR)
     if state.stage is Stage.SECTOR_FREE:
-        return WriteRegisters(*_present(state, config))
+        return WriteRegisters(*_present(state, config)) if state.is_place_sure else None
     if state.stage is Stage.PRESENT_WRITTEN:
         return ReadRegisters()
     if config.register_watchdog_s > 0.0 and state.watchdog is Watchdog.UNKNOWN:

@@ -194,7 +194,7 @@ class Foreground:
             self._report_doubt(status)
             return
         reading = Reading(sample_tai_s, status.az_deg, status.el_deg, is_acquired(status), status.agc_db)
-        self._seen = replace(self._seen, status=status, reading=reading)
+        self._seen = replace(self._seen, status=status, reading=reading, is_confirmed=self._doubt.is_confirmed)
         is_fittable = self._area.state.track in AUTOTRACKING and not self._area.state.encoders.problem
         if self._dwell.is_locked(reading) and is_fittable:
             self._area.to_fit.append(reading)
