@@ -28,8 +28,7 @@ def absorb(
         state = _absorb_refusal(state, now_tai_s, events)
     if seen.status is not None and seen.reading is not None:
         state = _absorb_in_force(state, seen)
-        state = _absorb_reading(state, seen.status, seen.reading, config)
-        state = replace(state, is_place_sure=seen.is_confirmed)
+        state = _absorb_reading(state, seen.status, seen.reading, config, is_confirmed=seen.is_confirmed)
         state = _absorb_offset(state, sky, seen.reading)
         state = _absorb_encoders(state, sky, seen.status, seen.reading, events)
     if seen.extra is not None:
@@ -69,7 +68,9 @@ def _absorb_encoders(
     return replace(state, encoders=watch)
 
 
-def _absorb_reading(state: ControlState, status: Status, reading: Reading, config: ControlConfig) -> ControlState:
+def _absorb_reading(
+    state: ControlState, status: Status, reading: Reading, config: ControlConfig, *, is_confirmed: bool
+) -> ControlState:
     az_deg = encoder_continuous(status.az_deg, status.is_sector_high, config.azimuth)
     since = (state.acquired_since_tai_s or reading.tai_s) if is_acquired(status) else None
     state = _learn_lag(state, az_deg, status.el_deg)
@@ -79,6 +80,7 @@ def _absorb_reading(state: ControlState, status: Status, reading: Reading, confi
         watchdog=_watchdog_after(state, status),
         status=status,
         reading=reading,
+        is_place_sure=is_confirmed,
         az_deg=az_deg,
         track_of_readings=(*state.track_of_readings[1 - RATE_READINGS :], (reading.tai_s, az_deg, status.el_deg)),
         acquired_since_tai_s=since,

@@ -80,7 +80,7 @@ def respect_stop(before: ControlState, state: ControlState, config: ControlConfi
     is_new_fault = now.has_interlock_fault and not held.has_interlock_fault
     may_be_watchdog = 0.0 < config.register_watchdog_s <= unwritten_s
     if not is_stopped or is_new_fault or not state.is_armed(config) or state.latch:
-        return replace(state, is_stop_doubted=False)
+        return replace(state, is_stop_doubted=False) if state.is_stop_doubted else state
     if may_be_watchdog:
         return replace(state, is_stop_doubted=not now.has_interlock_fault)
     return _disarm(state, ANOTHER_HAND, events)
@@ -104,8 +104,8 @@ def note_held(state: ControlState, config: ControlConfig) -> ControlState:
     if status is None or state.track is TrackState.LINK_LOST or state.is_stop_doubted:
         return state
     is_held = state.track in ACTIVE if state.stage is Stage.READY else state.held is not None
-    has_fault = status.has_interlock_fault
-    return replace(state, held=Held(has_fault) if is_held and status.mode in STOPPED_FROM else None)
+    held = Held(status.has_interlock_fault) if is_held and status.mode in STOPPED_FROM else None
+    return state if held == state.held else replace(state, held=held)
 
 
 def respect_interlock(
