@@ -276,6 +276,10 @@ def test_manual_arming_and_a_free_running_clock_are_warned_of(tmp_path: Path, mo
 
 def test_a_latch_and_a_disarm_of_the_last_run_are_told_before_the_next(tmp_path: Path) -> None:
     left = tmp_path / "state"
+    with acu() as small:
+        asked = ("check", "--config", write(tmp_path, station(small.url), scd=BROUWER), "--state", left)
+        assert acu_daemon(*asked).code == 0
+    assert not left.exists()  # it changes nothing
     left.mkdir()
     (left / "disarmed").touch()
     with acu() as small:

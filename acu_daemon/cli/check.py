@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import os
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from acu_daemon.control.plan import plan_pass
 from acu_daemon.edge.clock import SystemClock, is_clock_synchronised
 from acu_daemon.edge.latch import ADVICE, DISARMED, LATCH
 from acu_daemon.edge.link import check_rate, make_link
-from acu_daemon.edge.state import SNAPSHOT, state_directory
+from acu_daemon.edge.state import SNAPSHOT, state_directory, state_path
 from acu_daemon.errors import AcuDaemonError, LinkError, OrbitError, UsageError
 from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.timescales import utc_text
@@ -79,7 +80,7 @@ def _findings(config: Path, satellite: str | None, now_tai_s: float, state: Path
     yield Finding(GO, "station.toml", f"{station.station.name}, ACU at {station.acu.url}")
     if station.safety.arm == "manual":
         yield Finding(WARN, "arming", '[safety] arm = "manual": the daemon writes nothing until a person arms it')
-    yield from _left_behind(state_directory(state, is_rehearsal=False))
+    yield from _left_behind(state_path(state, is_rehearsal=False))
     yield clock_finding()
     names = [satellite] if satellite else satellite_names(config)
     if not names:
@@ -99,7 +100,7 @@ def _findings(config: Path, satellite: str | None, now_tai_s: float, state: Path
 def _left_behind(directory: Path) -> Iterator[Finding]:
     """What of the last run forbids the next one to move."""
     for verdict, name in ((NO_GO, LATCH), (WARN, DISARMED)):
-        if (directory / name).exists():
+        if os.access(directory / name, os.F_OK):  # one that is not ours to look into says nothing
             yield Finding(verdict, name, f"{directory / name} is there: {ADVICE[name]}")
 
 
