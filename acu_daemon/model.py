@@ -6,7 +6,7 @@ Angles are degrees.  Azimuth is clockwise from true north.  "Encoder frame" mean
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from math import cos, radians
+from math import asin, cos, degrees, radians, sin, sqrt
 from typing import Literal
 
 import numpy as np
@@ -232,5 +232,5 @@ class Pass:
 def sky_angle_deg(az1_deg: float, el1_deg: float, az2_deg: float, el2_deg: float) -> float:
     """Angle on the sky between two directions, well conditioned for small angles (haversine)."""
     d_el, d_az = radians(el2_deg - el1_deg), radians(az2_deg - az1_deg)
-    h = np.sin(d_el / 2) ** 2 + cos(radians(el1_deg)) * cos(radians(el2_deg)) * np.sin(d_az / 2) ** 2
-    return float(np.degrees(2 * np.arcsin(min(1.0, float(np.sqrt(h))))))
+    h = sin(d_el / 2) ** 2 + cos(radians(el1_deg)) * cos(radians(el2_deg)) * sin(d_az / 2) ** 2
+    return degrees(2 * asin(min(1.0, sqrt(h))))

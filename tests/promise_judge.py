@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 ORDERS = (WriteAndPoll, WriteRegisters, SelectMode, SelectBackup, WriteParameter)
 SILENT_S = 0.7  # half a second, the tick that sees it, and its exchange
 STALE_S = 0.7  # a link is closed after half a second of silence: nothing older may arrive
-PRESENT_S, PRESENT_DEG = 2.5, 1.0  # the present angles are those of a status so old at most
+PRESENT_S, PRESENT_DEG = 2.5, 1.0  # the present angles are those of a status so old at most; on the sky
 BURST_SHARE = 0.5  # of the period
 START_SHARE = 0.1  # the first write ends a start within its tick, however late that is in the period
 FOLLOW_S_S = 0.0021  # seconds of a second by which UTC may follow the system's clock
@@ -164,7 +164,7 @@ class Judge:
 
     def _is_of_a_report(self, az_deg: float, el_deg: float) -> bool:
         return any(
-            abs(wrap_180(az_deg - status.az_deg)) < PRESENT_DEG and abs(el_deg - status.el_deg) < PRESENT_DEG
+            sky_angle_deg(az_deg, el_deg, status.az_deg, status.el_deg) < PRESENT_DEG
             for time_s, status in self._reports
             if time_s > self._now_s - PRESENT_S
         )

@@ -45,7 +45,7 @@ def test_the_residual_of_a_model_is_the_median_of_the_newest_seconds() -> None:
     seen = look_at(source, tai_s, where)
     el_deg = seen.el_deg + np.where(tai_s >= tai_s[-1] - 5.0, 0.2, 3.0)
     el_deg[-1] += 7.0
-    off_deg = newest_residual_deg(source, where, None, Readings(tai_s, seen.az_deg, el_deg), EstimatorSettings())
+    off_deg = newest_residual_deg(source, where, None, Readings(tai_s, seen.az_deg, el_deg))
     assert off_deg == pytest.approx(0.2, abs=1e-6)
 
 

@@ -182,7 +182,7 @@ def test_under_the_local_panel_it_polls_and_nothing_else(track: TrackState) -> N
 def test_disarmed_it_only_reads(track: TrackState, mode: AcuMode) -> None:
     state = replace(ready(track, status(mode)), stage=Stage.REGISTERS_KNOWN)
     _, orders = tick(state, saw(status(mode)), SKY, NOW, replace(CONFIG, is_armed=False))
-    assert orders.first == Poll()
+    assert isinstance(orders.first, Poll | ReadFaults)
     assert orders.extra is None or isinstance(orders.extra, ReadFaults)
 
 
@@ -190,8 +190,22 @@ def test_disarmed_it_only_reads(track: TrackState, mode: AcuMode) -> None:
 def test_before_the_start_is_done_no_path_is_written_and_no_mode_selected(stage: Stage) -> None:
     state = replace(ready(TrackState.IDLE, status(AcuMode.STANDBY)), stage=stage)
     _, orders = tick(state, saw(status(AcuMode.STANDBY)), FITTED, NOW, CONFIG)
-    assert orders.first == Poll()
-    assert not isinstance(orders.extra, SelectMode | SelectBackup)
+    for order in (orders.first, orders.extra):
+        assert not isinstance(order, WriteAndPoll | SelectMode | SelectBackup)
+
+
+@pytest.mark.parametrize(
+    ("is_confirmed", "later_s", "first"),
+    [(True, 0.0, Identify()), (True, 0.2, Poll()), (False, 0.0, Poll())],
+)
+def test_a_start_goes_on_without_a_poll_while_it_is_sure_where_the_antenna_is(
+    is_confirmed: bool, later_s: float, first: Command
+) -> None:
+    """On a slow line each poll beside the start's exchanges would cost half a tick."""
+    seen = status(AcuMode.STANDBY)
+    state = replace(ready(TrackState.IDLE, seen), stage=Stage.NEW)
+    _, orders = tick(state, saw(seen, is_confirmed=is_confirmed), FITTED, NOW + later_s, CONFIG)
+    assert orders.first == first
 
 
 # The states
@@ -339,6 +353,7 @@ def test_on_a_status_from_before_an_outage_nothing_is_decided() -> None:
     for stage in (Stage.NEW, Stage.REGISTERS_KNOWN, Stage.SECTOR_FREE, Stage.READY):
         _, orders = tick(replace(stale, stage=stage), Observation(), FITTED, NOW + LINK_SILENCE_S + 0.1, CONFIG)
         assert orders.extra is None
+        assert isinstance(orders.first, Poll | WriteAndPoll)
 
 
 def test_no_mode_is_selected_while_the_registers_are_old() -> None:
@@ -400,4 +415,4 @@ def test_registers_read_back_wrong_are_written_again_before_any_mode() -> None:
     wrong = Exchange(ReadRegisters(), Registers(AZ_DEG + 5.0, EL_DEG, 0, 3))
     state, orders = tick(state, saw(seen, extra=wrong), FITTED, NOW, CONFIG)
     assert state.stage is Stage.SECTOR_FREE
-    assert isinstance(orders.extra, WriteRegisters)
+    assert isinstance(orders.first, WriteRegisters)

@@ -45,9 +45,14 @@ class FullEstimator(BaseEstimator):
         self._parts: list[Sights] = []
         self._solution: Solution | None = None
         self._is_new = False
+        self._fit: FitResult | None = None  # to all readings so far
         self._may_widen = may_widen
         self._width = 0  # of widening.WIDTHS
         self._next_try_count = 0
+
+    def add(self, readings: Readings) -> None:
+        self._fit = None
+        super().add(readings)
 
     def _use(self, readings: Readings) -> list[str | None]:
         seen = sights(readings)
@@ -84,14 +89,14 @@ class FullEstimator(BaseEstimator):
 
         Raises:  OrbitError: the source has no answer for one of the readings' times.
         """
-        if self._problem is None:
-            return None
-        seen = _joined(self._parts)
-        self._parts = [seen]
-        if self._is_new or self._solution is None:
-            self._solution = self._solve(self._problem, seen)
-            self._is_new = False
-        return self._result(self._solution, float(seen.tai_s[-1]))
+        if self._problem is not None and self._fit is None:
+            seen = _joined(self._parts)
+            self._parts = [seen]
+            if self._is_new or self._solution is None:
+                self._solution = self._solve(self._problem, seen)
+                self._is_new = False
+            self._fit = self._result(self._solution, float(seen.tai_s[-1]))
+        return self._fit
 
     def _solve(self, problem: Problem, seen: Sights) -> Solution:
         given = WIDTHS[self._width].of(problem)

@@ -4,13 +4,12 @@ The newest locked residuals decide; a new fit that is bad three times in a row s
 GD 7200, reference/field.md).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
-from acu_daemon.assist.offsets import offsets
-from acu_daemon.assist.settings import EstimatorSettings
+from acu_daemon.assist.offsets import angles_deg
 from acu_daemon.model import FitResult, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
 
@@ -53,13 +52,10 @@ def choose(before: ModelChoice, residuals_deg: dict[Model, float], noise_deg: fl
     return ModelChoice(best, before.bad_count + 1) if is_bad else ModelChoice(Model.NEW_FIT)
 
 
-def newest_residual_deg(
-    source: Propagator, site: Site, fit: FitResult | None, readings: Readings, settings: EstimatorSettings
-) -> float:
+def newest_residual_deg(source: Propagator, site: Site, fit: FitResult | None, readings: Readings) -> float:
     """Robust mean of the angles on the sky between the newest readings and a model: their median.
 
     Raises:  OrbitError: the source has no answer for one of the times.
     """
     newest = readings.part(readings.tai_s >= readings.tai_s[-1] - NEWEST_S)
-    model = None if fit is None else replace(fit, covariance=None)  # its sigma is of no use here, and slow
-    return float(np.median(offsets(source, site, model, newest, settings).angle_deg))
+    return float(np.median(angles_deg(source, site, fit, newest)))

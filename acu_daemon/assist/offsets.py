@@ -66,19 +66,40 @@ def offsets(
 
     Raises:  OrbitError: the source has no answer for one of the times.
     """
-    propagator = source if fit is None else source.corrected(fit.correction)
+    propagator = _propagator(source, fit)
     t, count = readings.tai_s, len(readings)
     seen = encoder_look(propagator, np.concatenate((t, t - HALF_STEP_S, t + HALF_STEP_S)), site, fit)
-    cos_el = np.maximum(np.cos(np.radians(seen.el_deg[:count])), LEAST_COS_EL)
+    cos_el, right_deg, up_deg = _on_the_sky(readings, seen.az_deg[:count], seen.el_deg[:count])
     of_path_deg = sigma_deg(propagator, t, site, fit)
     noise_deg = max(settings.sigma_azimuth_deg, settings.sigma_elevation_deg)
     spread_deg = noise_deg if of_path_deg is None else np.hypot(noise_deg, of_path_deg)
     return Offsets(
         tai_s=t,
-        right_deg=wrap_180_array(readings.az_deg - seen.az_deg[:count]) * cos_el,
-        up_deg=readings.el_deg - seen.el_deg[:count],
+        right_deg=right_deg,
+        up_deg=up_deg,
         cos_el=cos_el,
         near_deg=np.maximum(NEAR_BEAMS * settings.beamwidth_deg, NEAR_SIGMAS * spread_deg) * np.ones(count),
         az_deg_s2=(seen.az_rate_deg_s[2 * count :] - seen.az_rate_deg_s[count : 2 * count]) / (2 * HALF_STEP_S),
         el_deg_s2=(seen.el_rate_deg_s[2 * count :] - seen.el_rate_deg_s[count : 2 * count]) / (2 * HALF_STEP_S),
     )
+
+
+def angles_deg(source: Propagator, site: Site, fit: FitResult | None, readings: Readings) -> Array:
+    """Angles on the sky (N,) between readings and the path of a fit, or of the source itself.
+
+    Raises:  OrbitError: the source has no answer for one of the times.
+    """
+    seen = encoder_look(_propagator(source, fit), readings.tai_s, site, fit)
+    _, right_deg, up_deg = _on_the_sky(readings, seen.az_deg, seen.el_deg)
+    angle: Array = np.hypot(right_deg, up_deg)
+    return angle
+
+
+def _propagator(source: Propagator, fit: FitResult | None) -> Propagator:
+    return source if fit is None else source.corrected(fit.correction)
+
+
+def _on_the_sky(readings: Readings, az_deg: Array, el_deg: Array) -> tuple[Array, Array, Array]:
+    """Cosine of the path's elevation; readings minus path, right and up."""
+    cos_el = np.maximum(np.cos(np.radians(el_deg)), LEAST_COS_EL)
+    return cos_el, wrap_180_array(readings.az_deg - az_deg) * cos_el, readings.el_deg - el_deg

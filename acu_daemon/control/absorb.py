@@ -1,12 +1,11 @@
 """What the ACU said, taken into the memory of the decision: status, reading, replies, refusals.  Pure."""
 
-from dataclasses import replace
-
 from acu_daemon.control.causes import is_acquired
+from acu_daemon.control.changed import changed
 from acu_daemon.control.encoder_watch import EncoderWatch, watch_encoders
 from acu_daemon.control.start import after_reply
 from acu_daemon.control.state import ControlConfig, ControlState, Event, Observation, Sky, Stage, Watchdog
-from acu_daemon.model import Reading
+from acu_daemon.model import Pointing, Reading
 from acu_daemon.pointing.wrap import encoder_continuous
 from acu_daemon.protocol.angles import LSB_DEG
 from acu_daemon.protocol.messages import AcuMode, Backup, Nak, Status, Stop
@@ -29,12 +28,14 @@ def absorb(
     if seen.status is not None and seen.reading is not None:
         state = _absorb_in_force(state, seen)
         state = _absorb_reading(state, seen.status, seen.reading, config, is_confirmed=seen.is_confirmed)
-        state = _absorb_offset(state, sky, seen.reading)
-        state = _absorb_encoders(state, sky, seen.status, seen.reading, events)
+        path = sky.prediction.at(seen.reading.tai_s) if sky.prediction and is_acquired(seen.status) else None
+        if path is not None:
+            state = _absorb_offset(state, path, seen.reading)
+        state = _absorb_encoders(state, path, seen.status, seen.reading, events)
     if seen.extra is not None:
         state = after_reply(state, seen.extra, config, events)
         if isinstance(seen.extra.reply, Nak) and not isinstance(seen.extra.command, Stop):
-            state = replace(state, extra_after_tai_s=now_tai_s + REFUSED_EXTRA_S)
+            state = changed(state, extra_after_tai_s=now_tai_s + REFUSED_EXTRA_S)
     return state
 
 
@@ -44,7 +45,7 @@ def _absorb_refusal(state: ControlState, now_tai_s: float, events: list[Event]) 
     fields = {"az_deg": sent.az_deg, "el_deg": sent.el_deg} if sent else {}
     events.append(Event("acu.refused_write", fields, is_warning=True))
     pause_s = REFUSED_PAUSE_S if is_again else 0.0
-    return replace(state, refused_tai_s=now_tai_s, refused_until_tai_s=now_tai_s + pause_s)
+    return changed(state, refused_tai_s=now_tai_s, refused_until_tai_s=now_tai_s + pause_s)
 
 
 def _absorb_in_force(state: ControlState, seen: Observation) -> ControlState:
@@ -52,20 +53,19 @@ def _absorb_in_force(state: ControlState, seen: Observation) -> ControlState:
     sent = state.commands[-1] if state.commands else None
     if sent is None or seen.refused is not None or seen.reading is None:
         return state
-    return replace(state, in_force=(seen.reading.tai_s, sent.az_deg, sent.el_deg))
+    return changed(state, in_force=(seen.reading.tai_s, sent.az_deg, sent.el_deg))
 
 
 def _absorb_encoders(
-    state: ControlState, sky: Sky, status: Status, reading: Reading, events: list[Event]
+    state: ControlState, path: Pointing | None, status: Status, reading: Reading, events: list[Event]
 ) -> ControlState:
     """Watch for frozen encoders while autotrack holds the satellite."""
-    path = sky.prediction.at(reading.tai_s) if sky.prediction and is_acquired(status) else None
     watch = watch_encoders(state.encoders, reading.tai_s, status, path) if path else EncoderWatch()
     if watch.problem and not state.encoders.problem:
         events.append(Event("encoder.frozen", {"problem": watch.problem, "action": "not fitted"}, is_warning=True))
     elif state.encoders.problem and not watch.problem:
         events.append(Event("encoder.moves"))
-    return replace(state, encoders=watch)
+    return changed(state, encoders=watch)
 
 
 def _absorb_reading(
@@ -74,7 +74,7 @@ def _absorb_reading(
     az_deg = encoder_continuous(status.az_deg, status.is_sector_high, config.azimuth)
     since = (state.acquired_since_tai_s or reading.tai_s) if is_acquired(status) else None
     state = _learn_lag(state, az_deg, status.el_deg)
-    return replace(
+    return changed(
         state,
         stage=_stage_after(state, status),
         watchdog=_watchdog_after(state, status),
@@ -126,7 +126,7 @@ def _learn_lag(state: ControlState, az_deg: float, el_deg: float) -> ControlStat
         and _is_steady(before.el_deg, in_force.el_deg, newest.el_deg)
     ):
         return state
-    return replace(
+    return changed(
         state,
         lag_az=state.lag_az.seen(in_force.az_deg - before.az_deg, in_force.az_deg - az_deg),
         lag_el=state.lag_el.seen(in_force.el_deg - before.el_deg, in_force.el_deg - el_deg),
@@ -139,16 +139,13 @@ def _is_steady(before_deg: float, in_force_deg: float, newest_deg: float) -> boo
     return abs(next_deg - step_deg) < STEADY_SHARE * abs(step_deg) + 2 * LSB_DEG
 
 
-def _absorb_offset(state: ControlState, sky: Sky, reading: Reading) -> ControlState:
+def _absorb_offset(state: ControlState, path: Pointing, reading: Reading) -> ControlState:
     """Follow the distance between reading and prediction while acquired: it carries the path before the first fit."""
-    point = sky.prediction.at(reading.tai_s) if sky.prediction else None
-    if point is None or state.status is None or not is_acquired(state.status):
-        return state
-    az = wrap_180(reading.az_deg - point.az_deg)
-    el = reading.el_deg - point.el_deg
+    az = wrap_180(reading.az_deg - path.az_deg)
+    el = reading.el_deg - path.el_deg
     if state.offset_az_deg is None:
-        return replace(state, offset_az_deg=az, offset_el_deg=el)
-    return replace(
+        return changed(state, offset_az_deg=az, offset_el_deg=el)
+    return changed(
         state,
         offset_az_deg=state.offset_az_deg + OFFSET_GAIN * wrap_180(az - state.offset_az_deg),
         offset_el_deg=state.offset_el_deg + OFFSET_GAIN * (el - state.offset_el_deg),

@@ -82,7 +82,7 @@ def watch_axis(watch: AxisWatch, seen: AxisSeen, limits: AxisLimits, bounds: Bou
         return watch, ""
     if seen.duty is Duty.UNWATCHED or last is None or _is_new(last, seen, limits, bounds):
         return _marked(AxisWatch(seen), seen, abs(seen.rate_deg_s)), ""
-    watch = _watch_rate(replace(watch, last=seen), seen, limits, bounds)
+    watch = replace(watch, last=seen, fast_since_tai_s=_fast_since_tai_s(watch, seen, limits, bounds))
     if seen.tai_s - watch.fast_since_tai_s >= FAST_S:
         return watch, "moves faster than its drive can"
     if seen.duty is Duty.STAND:
@@ -101,20 +101,13 @@ def _is_new(last: AxisSeen, seen: AxisSeen, limits: AxisLimits, bounds: Bounds) 
 
 
 def _marked(watch: AxisWatch, seen: AxisSeen, wrong_deg_s: float = 0.0, side: int = 0) -> AxisWatch:
-    return replace(
-        watch,
-        side=side,
-        mark_tai_s=seen.tai_s,
-        mark_deg=seen.angle_deg,
-        wrong_deg_s=wrong_deg_s,
-        wrong_since_tai_s=inf,
-    )
+    return AxisWatch(watch.last, side, seen.tai_s, seen.angle_deg, wrong_deg_s, fast_since_tai_s=watch.fast_since_tai_s)
 
 
-def _watch_rate(watch: AxisWatch, seen: AxisSeen, limits: AxisLimits, bounds: Bounds) -> AxisWatch:
+def _fast_since_tai_s(watch: AxisWatch, seen: AxisSeen, limits: AxisLimits, bounds: Bounds) -> float:
     most_deg_s = FAST_MARGIN * limits.max_rate_deg_s + bounds.error_deg / seen.scale / AWAY_S
     is_fast = abs(seen.rate_deg_s) > most_deg_s
-    return replace(watch, fast_since_tai_s=min(watch.fast_since_tai_s, seen.tai_s) if is_fast else inf)
+    return min(watch.fast_since_tai_s, seen.tai_s) if is_fast else inf
 
 
 def _braking(watch: AxisWatch, limits: AxisLimits) -> tuple[float, float]:
@@ -176,12 +169,8 @@ def watch_axes(
     bounds: Bounds,
 ) -> tuple[AxesWatch, str]:
     """Judge one more reading of both; an axis at a limit switch that its command lies behind is left alone."""
-    new_az, az_problem = watch_axis(
-        watch.az, replace(az, gap_deg=_open(az.gap_deg, *az_ends(status))), limits[0], bounds
-    )
-    new_el, el_problem = watch_axis(
-        watch.el, replace(el, gap_deg=_open(el.gap_deg, *el_ends(status))), limits[1], bounds
-    )
+    new_az, az_problem = watch_axis(watch.az, _open(az, *az_ends(status)), limits[0], bounds)
+    new_el, el_problem = watch_axis(watch.el, _open(el, *el_ends(status)), limits[1], bounds)
     problems = [f"{name} {text}" for name, text in (("azimuth", az_problem), ("elevation", el_problem)) if text]
     return AxesWatch(new_az, new_el), "; ".join(problems)
 
@@ -196,10 +185,10 @@ def el_ends(status: Status) -> tuple[bool, bool]:
     return status.is_at_up_limit, status.is_at_down_limit
 
 
-def _open(gap_deg: float | None, is_at_max: bool, is_at_min: bool) -> float | None:
-    if gap_deg is None or (is_at_max and gap_deg > 0.0) or (is_at_min and gap_deg < 0.0):
-        return None
-    return gap_deg
+def _open(seen: AxisSeen, is_at_max: bool, is_at_min: bool) -> AxisSeen:
+    gap_deg = seen.gap_deg
+    is_behind = gap_deg is not None and ((is_at_max and gap_deg > 0.0) or (is_at_min and gap_deg < 0.0))
+    return replace(seen, gap_deg=None) if is_behind else seen
 
 
 def sky_scale(el_deg: float) -> float:

@@ -13,7 +13,8 @@ from acu_daemon.units import wrap_180
 MOVED_COUNT, CONTRADICTING_COUNT = 2, 5  # in a row, before they are believed
 SLACK_DEG = 1.0  # on the sky: noise, and more is left to the gate of readings
 RATE_MARGIN = 1.5  # of the drive's rate
-CONFIRMED_S = 0.5  # between two that confirm each other
+CONFIRMED_COUNT = 3  # in a row show the antenna in one place: then it is there, and not garbled alike
+CONFIRMED_S, CONFIRMED_DEG = 0.5, 0.5  # between two of them; on the sky, where no satellite is faster in a tick
 BACKUP_MODES = (AcuMode.RATE_MEMORY, AcuMode.POSITION_MEMORY, AcuMode.REMOTE_BACKUP)
 SELECTED_MODES = (AcuMode.ACQUIRE, AcuMode.AUTOTRACK)  # autotrack is selected in these, and in the backup modes
 DESELECTED_MODES = (AcuMode.STANDBY, AcuMode.MANUAL, AcuMode.REMOTE, AcuMode.STOWING, AcuMode.STOWED, AcuMode.FAULT)
@@ -47,16 +48,14 @@ class Doubt:
         self._doubted: tuple[float, Status] | None = None
         self._agreeing_count = 0
         self._last: tuple[float, Status] | None = None
-        self.is_confirmed = False  # the last status, by the one just before it: after a silence one alone proves little
+        self._steady_count = 0  # in a row, the last one among them
         self.count = 0
         self.reason = ""
 
     def believes(self, status: Status, tai_s: float) -> bool:
         """Judge the next status, sampled at an instant; the reason of a doubt is in `reason`."""
         last, self._last = self._last, (tai_s, status)
-        self.is_confirmed = (
-            last is not None and tai_s - last[0] <= CONFIRMED_S and not self._moved(last, status, last[0])
-        )
+        self._steady_count = 1 + (self._steady_count if last is not None and _is_steady(last, status, tai_s) else 0)
         wrong = contradictions(status)
         self.reason = f"contradicts itself: {', '.join(wrong)}" if wrong else self._moved(self._believed, status, tai_s)
         if not self.reason:
@@ -67,8 +66,15 @@ class Doubt:
             if self._agreeing_count < (CONTRADICTING_COUNT if wrong else MOVED_COUNT):
                 self.count += 1
                 return False
+            if not wrong:
+                self._steady_count = 0  # where it has jumped to is to be confirmed by more than those two
         self._believed = tai_s, status
         return True
+
+    @property
+    def is_confirmed(self) -> bool:
+        """Whether the place in the last status is sure: after a silence one alone proves little."""
+        return self._steady_count >= CONFIRMED_COUNT
 
     def _agrees(self, status: Status, wrong: tuple[str, ...], tai_s: float) -> bool:
         """Whether the last doubted status, just before this one, says the same."""
@@ -90,3 +96,10 @@ class Doubt:
             if moved_deg > slack_deg + RATE_MARGIN * limits.max_rate_deg_s * span_s:
                 return f"{name} moved {moved_deg:.1f} deg in {span_s:.2f} s"
         return ""
+
+
+def _is_steady(before: tuple[float, Status], status: Status, tai_s: float) -> bool:
+    """Whether two in a row show the antenna in one place."""
+    az_deg = abs(wrap_180(status.az_deg - before[1].az_deg)) * sky_scale(status.el_deg)
+    el_deg = abs(status.el_deg - before[1].el_deg)
+    return tai_s - before[0] <= CONFIRMED_S and max(az_deg, el_deg) <= CONFIRMED_DEG

@@ -4,9 +4,9 @@ The gate makes good register writes out of a path; the fence knows nothing of pa
 stage, arming, latch and limits allow it, and what it keeps back is an error of ours: counted and logged.
 """
 
-from dataclasses import replace
 from math import isfinite
 
+from acu_daemon.control.changed import changed
 from acu_daemon.control.start import SECTOR, WATCHDOG
 from acu_daemon.control.state import ControlConfig, ControlState, Event, Orders, Stage
 from acu_daemon.protocol.angles import LSB_DEG
@@ -43,7 +43,7 @@ def fence(state: ControlState, orders: Orders, config: ControlConfig) -> tuple[C
         if command is not None and reason:
             events.append(Event("fence.refused", {"command": command_text(command), "reason": reason}, is_warning=True))
     count = state.gate_refusal_count + bool(first_refusal) + bool(extra_refusal)
-    return replace(state, gate_refusal_count=count), Orders(
+    return changed(state, gate_refusal_count=count), Orders(
         Poll() if first_refusal else orders.first, None if extra_refusal else orders.extra, tuple(events)
     )
 

@@ -147,4 +147,4 @@ def _share(limits: AxisLimits, rate: float, acceleration: float) -> AxisLimits:
 
 
 def _legal(axis: AxisState, limits: AxisLimits) -> AxisState:
-    return replace(axis, position_deg=clamp_deg(axis.position_deg, limits.min_deg, limits.max_deg))
+    return AxisState(clamp_deg(axis.position_deg, limits.min_deg, limits.max_deg), axis.rate_deg_s)

@@ -5,10 +5,10 @@ the emergency stop and an open door.  The latch stays until a person clears it, 
 """
 
 from collections.abc import Iterable
-from dataclasses import replace
 from math import inf
 
 from acu_daemon.control.axis_watch import AxesWatch, AxisSeen, duty_of, sky_scale, watch_axes
+from acu_daemon.control.changed import changed
 from acu_daemon.control.start import WATCHDOG
 from acu_daemon.control.state import ControlConfig, ControlState, Event, Held, Observation, Request, Stage, Watchdog
 from acu_daemon.control.states import ACTIVE, TrackState
@@ -29,22 +29,22 @@ def obey(state: ControlState, requests: Iterable[Request], config: ControlConfig
         if request is Request.CLEAR and state.latch:
             events.append(Event("latch.cleared", {"latch": state.latch}))
             is_stop_due = state.is_stop_due and not state.is_armed(config)
-            state = replace(_anew(state), latch="", is_stop_due=is_stop_due)
+            state = changed(_anew(state), latch="", is_stop_due=is_stop_due)
         elif request is Request.ARM and not config.is_shadow:
-            state = replace(state, held=None, is_stop_doubted=False)  # whoever says so has seen how the antenna stands
+            state = changed(state, held=None, is_stop_doubted=False)  # whoever says so has seen how the antenna stands
             if not state.is_armed(config):
                 events.append(Event("armed"))
                 is_stop_due = state.is_stop_due and bool(state.latch)
-                state = replace(_anew(state), arming=True, disarmed_by="", is_stop_due=is_stop_due)
+                state = changed(_anew(state), arming=True, disarmed_by="", is_stop_due=is_stop_due)
         elif request is Request.DISARM and state.is_armed(config):
             state = _disarm(state, "a person", events)
-            state = replace(state, is_stop_due=state.is_stop_due or state.in_force is not None)
+            state = changed(state, is_stop_due=state.is_stop_due or state.in_force is not None)
     return state
 
 
 def _anew(state: ControlState) -> ControlState:
     """Before the next write the present angles are written, as at a start."""
-    return replace(
+    return changed(
         state,
         stage=min(state.stage, Stage.REGISTERS_KNOWN),
         last_extra=None,
@@ -60,7 +60,7 @@ def _anew(state: ControlState) -> ControlState:
 def _disarm(state: ControlState, by: str, events: list[Event]) -> ControlState:
     advice = "`acu-daemon arm` goes on"
     events.append(Event("disarmed", {"by": by, "advice": advice}, is_warning=True))
-    return replace(_anew(state), arming=False, disarmed_by=by, watchdog=state.watchdog)
+    return changed(_anew(state), arming=False, disarmed_by=by, watchdog=state.watchdog)
 
 
 def respect_stop(before: ControlState, state: ControlState, config: ControlConfig, events: list[Event]) -> ControlState:
@@ -80,9 +80,9 @@ def respect_stop(before: ControlState, state: ControlState, config: ControlConfi
     is_new_fault = now.has_interlock_fault and not held.has_interlock_fault
     may_be_watchdog = 0.0 < config.register_watchdog_s <= unwritten_s
     if not is_stopped or is_new_fault or not state.is_armed(config) or state.latch:
-        return replace(state, is_stop_doubted=False) if state.is_stop_doubted else state
+        return changed(state, is_stop_doubted=False) if state.is_stop_doubted else state
     if may_be_watchdog:
-        return replace(state, is_stop_doubted=not now.has_interlock_fault)
+        return changed(state, is_stop_doubted=not now.has_interlock_fault)
     return _disarm(state, ANOTHER_HAND, events)
 
 
@@ -92,7 +92,7 @@ def settle_doubt(state: ControlState, seen: Observation, events: list[Event]) ->
         return state
     reply = seen.extra.reply  # FAULT DETAIL is answered always; an ACU that refuses it knows no such bit
     if isinstance(reply, Faults) and reply.system & WATCHDOG_TRIPPED:
-        return replace(state, is_stop_doubted=False, held=None)
+        return changed(state, is_stop_doubted=False, held=None)
     return _disarm(state, ANOTHER_HAND, events) if isinstance(reply, Faults | Nak) else state
 
 
@@ -100,12 +100,12 @@ def note_held(state: ControlState, config: ControlConfig) -> ControlState:
     """Remember that the daemon holds the antenna, through lost links and new starts until the ACU says otherwise."""
     status = state.status
     if not state.is_armed(config) or state.latch:
-        return replace(state, held=None)
+        return changed(state, held=None)
     if status is None or state.track is TrackState.LINK_LOST or state.is_stop_doubted:
         return state
     is_held = state.track in ACTIVE if state.stage is Stage.READY else state.held is not None
     held = Held(status.has_interlock_fault) if is_held and status.mode in STOPPED_FROM else None
-    return state if held == state.held else replace(state, held=held)
+    return state if held == state.held else changed(state, held=held)
 
 
 def respect_interlock(
@@ -114,8 +114,8 @@ def respect_interlock(
     """Disarm for the emergency stop or an open door: a person is there, and only a person can say that it is over."""
     faults = seen.extra.reply if seen.extra is not None else None
     if not isinstance(faults, Faults) or state.status is None:
-        return state if state.track is TrackState.FAULT else replace(state, faults_read=None)
-    state = replace(state, faults_read=_faults(state.status))
+        return state if state.track is TrackState.FAULT else changed(state, faults_read=None)
+    state = changed(state, faults_read=_faults(state.status))
     if not faults.interlock & (EMERGENCY_STOP | DOOR_OPEN) or not state.is_armed(config):
         return state
     return _disarm(state, "the emergency stop" if faults.interlock & EMERGENCY_STOP else "an open door", events)
@@ -160,12 +160,12 @@ def watch_antenna(state: ControlState, seen: Observation, config: ControlConfig,
         (config.azimuth, config.elevation),
         config.following,
     )
-    state = replace(state, axes=axes)
+    state = changed(state, axes=axes)
     if not problem:
         return state
     fields = {"problem": problem, "az_deg": state.az_deg, "el_deg": el_deg, "advice": "look, then `acu-daemon clear`"}
     events.append(Event("axis.latched", fields, is_warning=True))
-    return replace(state, latch=problem, is_stop_due=True)
+    return changed(state, latch=problem, is_stop_due=True)
 
 
 def _rates_deg_s(state: ControlState) -> tuple[float, float]:
@@ -190,4 +190,4 @@ def last_command(state: ControlState, config: ControlConfig) -> Command | None:
 def let_be(state: ControlState) -> ControlState:
     """Owe no STOP to an antenna that somebody else moves by now, or that cannot move."""
     is_others = state.status is not None and state.status.mode in NO_STOP_MODES
-    return replace(state, is_stop_due=False) if state.is_stop_due and is_others else state
+    return changed(state, is_stop_due=False) if state.is_stop_due and is_others else state

@@ -178,8 +178,7 @@ class Refitter:
             self._choice = ModelChoice(list(models)[-1])
         elif has_news:
             residuals_deg = {
-                model: newest_residual_deg(setup.propagator, setup.site, fit, kept, setup.settings)
-                for model, fit in models.items()
+                model: newest_residual_deg(setup.propagator, setup.site, fit, kept) for model, fit in models.items()
             }
             noise_deg = max(setup.settings.sigma_azimuth_deg, setup.settings.sigma_elevation_deg)
             self._choice = choose(self._choice, residuals_deg, noise_deg)

@@ -5,8 +5,7 @@ Only then is a path written or a mode selected, and the register watchdog set.  
 write.  An ACU that refuses to have its parameters read or written is taken as it is, with a warning.
 """
 
-from dataclasses import replace
-
+from acu_daemon.control.changed import changed
 from acu_daemon.control.state import ControlConfig, ControlState, Event, Exchange, Stage, Watchdog
 from acu_daemon.protocol.angles import LSB_DEG, clamp_deg
 from acu_daemon.protocol.messages import (
@@ -72,29 +71,29 @@ def after_reply(state: ControlState, extra: Exchange, config: ControlConfig, eve
     is_refused = isinstance(reply, Nak) and state.status is not None and state.status.is_remote_enabled
     match (state.stage, command, reply):
         case (_, Stop(), Ack()):
-            return replace(state, is_stop_due=False, watchdog=_perhaps_set(state, config))
+            return changed(state, is_stop_due=False, watchdog=_perhaps_set(state, config))
         case (_, ReadParameter("W") | WriteParameter("W"), _):
             return _after_watchdog(state, extra, config, events, is_refused=is_refused)
         case (Stage.READY, SelectBackup(), Ack()) if state.watchdog is Watchdog.SET:
-            return replace(state, watchdog=Watchdog.UNKNOWN)  # a backup to select may come from a power cycle
+            return changed(state, watchdog=Watchdog.UNKNOWN)  # a backup to select may come from a power cycle
         case (Stage.NEW, Identify(), Identity() as identity):
             return _identified(state, identity, config, events)
         case (Stage.IDENTIFIED, ReadRegisters(), Registers(tilt_code=tilt_code)):
-            return replace(state, stage=Stage.REGISTERS_KNOWN, tilt_code=tilt_code)
+            return changed(state, stage=Stage.REGISTERS_KNOWN, tilt_code=tilt_code)
         case (Stage.REGISTERS_KNOWN, ReadParameter("S"), Parameter(code=0)) | (
             Stage.REGISTERS_KNOWN,
             WriteParameter("S"),
             Ack(),
         ):
-            return replace(state, stage=Stage.SECTOR_FREE)
+            return changed(state, stage=Stage.SECTOR_FREE)
         case (Stage.REGISTERS_KNOWN, WriteParameter("S"), Nak()) if is_refused:
             advice = "the antenna may turn the long way round: set the ACU's parameter S to 0 by hand"
             events.append(Event("acu.sector_refused", {"advice": advice}, is_warning=True))
-            return replace(state, stage=Stage.SECTOR_FREE)
+            return changed(state, stage=Stage.SECTOR_FREE)
         case (Stage.SECTOR_FREE, WriteRegisters() as written, Ack()):
-            return replace(state, stage=Stage.PRESENT_WRITTEN, present_deg=(written.az_deg, written.el_deg))
+            return changed(state, stage=Stage.PRESENT_WRITTEN, present_deg=(written.az_deg, written.el_deg))
         case (Stage.PRESENT_WRITTEN, ReadRegisters(), Registers() as read):
-            return replace(state, stage=Stage.READY if _matches(state, read) else Stage.SECTOR_FREE)
+            return changed(state, stage=Stage.READY if _matches(state, read) else Stage.SECTOR_FREE)
     return state
 
 
@@ -105,7 +104,7 @@ def _identified(state: ControlState, identity: Identity, config: ControlConfig, 
         events.append(Event("acu.identity_doubted", {"identity": str(identity)}, is_warning=True))
     may_go_on = is_sure and (identity.is_simulated or not config.is_rehearsal)
     stage = Stage.IDENTIFIED if may_go_on else Stage.NEW
-    return replace(state, stage=stage, identity=identity, is_identity_sure=is_sure)
+    return changed(state, stage=stage, identity=identity, is_identity_sure=is_sure)
 
 
 def _perhaps_set(state: ControlState, config: ControlConfig) -> Watchdog:
@@ -120,15 +119,15 @@ def _after_watchdog(
     """The watchdog counts as set when it was read back; a clean stop has written 0."""
     if extra.command == WriteParameter(WATCHDOG, 0):
         is_done = is_refused or isinstance(extra.reply, Ack)
-        return replace(state, watchdog=Watchdog.UNKNOWN) if is_done else state
+        return changed(state, watchdog=Watchdog.UNKNOWN) if is_done else state
     if extra.reply == Parameter(WATCHDOG, watchdog_code(config)):
-        return replace(state, watchdog=Watchdog.SET, watchdog_try_count=0)
+        return changed(state, watchdog=Watchdog.SET, watchdog_try_count=0)
     count = state.watchdog_try_count + 1
     if is_refused or count >= WATCHDOG_TRIES:
         advice = "if this host dies in a loss of signal, the antenna drives to its last command and stays there"
         events.append(Event("acu.watchdog_refused", {"advice": advice}, is_warning=True))
-        return replace(state, watchdog=Watchdog.REFUSED)
-    return replace(state, watchdog_try_count=count)
+        return changed(state, watchdog=Watchdog.REFUSED)
+    return changed(state, watchdog_try_count=count)
 
 
 def _matches(state: ControlState, read: Registers) -> bool:

@@ -84,9 +84,9 @@ class Held:
     has_interlock_fault: bool = False  # n5.b3: the bit with which the ACU's register watchdog shows
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ControlState:
-    """The memory of the 10 Hz decision."""
+    """The memory of the 10 Hz decision.  Without slots, which `changed` (control.changed) cannot copy at once."""
 
     track: TrackState = TrackState.LINK_LOST
     entered_tai_s: float = -inf
@@ -97,7 +97,7 @@ class ControlState:
     present_deg: tuple[float, float] | None = None  # the first register write of this start, to be read back
     status: Status | None = None
     reading: Reading | None = None
-    is_place_sure: bool = False  # two statuses in a row agree where the antenna is
+    is_place_sure: bool = False  # the newest statuses agree where the antenna is
     az_deg: float = 0.0  # encoder azimuth of the newest status, in the frame of the wrap (continuous)
     track_of_readings: tuple[tuple[float, float, float], ...] = ()  # the newest: time, continuous azimuth, elevation
     acquired_since_tai_s: float | None = None
@@ -159,7 +159,7 @@ class Observation:
 
     reading: Reading | None = None  # with the status it came from; None: no good reply to the last write or poll
     status: Status | None = None
-    is_confirmed: bool = True  # the status, by the one before it
+    is_confirmed: bool = True  # the place in the status, by those before it
     extra: Exchange | None = None
     refused: Nak | None = None  # the ACU refused the register write
     silence_s: float = 0.0

@@ -10,6 +10,7 @@ from dataclasses import replace
 from acu_daemon.control.absorb import absorb
 from acu_daemon.control.axis_watch import AxesWatch
 from acu_daemon.control.causes import LINK_SILENCE_S, find_causes, path_point
+from acu_daemon.control.changed import changed
 from acu_daemon.control.fence import fence
 from acu_daemon.control.gate import Passed, gate
 from acu_daemon.control.hands import (
@@ -44,6 +45,7 @@ from acu_daemon.protocol.messages import Command, Poll, WriteAndPoll
 
 EXTRA_REPEAT_S = 0.3  # a command gets this long to show in the status before it is sent again
 EXTRA_SETTLED_S = 0.7  # after that; a status that still contradicts itself means it
+FRESH_S = 0.2  # a place that is sure is where the antenna is for so long
 SETTLE_S = 1.0  # after a change of state the servo takes up the path: what it is short of then is no lag
 REGULAR_SHARE = 0.1  # of the period: of writes that come less regularly no lag is learned
 CALM_SHARE = 0.25  # of the drive's rate: above it a lag is what the drive cannot do, not what it does late
@@ -83,12 +85,18 @@ def _order(
     if may_write and (extra is None or seen.has_room):
         state, write = _write(state, sky, now_tai_s, config, events)
         return _remember(state, extra, now_tai_s), Orders(write, extra, tuple(events))
-    state = replace(state, commands=(*state.commands[-2:], None))
+    state = changed(state, commands=(*state.commands[-2:], None))
     if not state.is_armed(config) and state.track is not TrackState.LINK_LOST:
-        state = replace(_write(state, sky, now_tai_s, config, events)[0], commands=state.commands)
-    if extra is not None and not seen.has_room:
+        state = changed(_write(state, sky, now_tai_s, config, events)[0], commands=state.commands)
+    if extra is not None and (not seen.has_room or _needs_no_poll(state, now_tai_s)):
         return _remember(state, extra, now_tai_s), Orders(extra, None, tuple(events))
     return _remember(state, extra, now_tai_s), Orders(Poll(), extra, tuple(events))
+
+
+def _needs_no_poll(state: ControlState, now_tai_s: float) -> bool:
+    """Whether the start may go on without another status: on a slow line each one costs it half a tick."""
+    is_fresh = state.reading is not None and now_tai_s - state.reading.tai_s < FRESH_S
+    return state.stage is not Stage.READY and state.is_place_sure and is_fresh
 
 
 def _may_write(state: ControlState, now_tai_s: float, config: ControlConfig) -> bool:
@@ -112,7 +120,7 @@ def _walk(
 ) -> ControlState:
     causes = find_causes(state, sky, seen.silence_s, now_tai_s, config)
     if state.track in HOLDING and _is_sure(sky, now_tai_s, config):
-        state = replace(state, hold_from_tai_s=now_tai_s)
+        state = changed(state, hold_from_tai_s=now_tai_s)
     step = transition(state.track, causes)
     if step is None:
         return state
@@ -124,15 +132,15 @@ def _walk(
             is_warning=track in (TrackState.LINK_LOST, TrackState.FAULT, TrackState.SEARCH),
         )
     )
-    state = replace(state, track=track, entered_tai_s=now_tai_s)
+    state = changed(state, track=track, entered_tai_s=now_tai_s)
     if track is TrackState.LINK_LOST:
         watchdog = Watchdog.UNKNOWN if state.watchdog is Watchdog.SET else state.watchdog
-        state = replace(
+        state = changed(
             state, stage=Stage.NEW, last_extra=None, axis_az=None, axis_el=None, last_write_tai_s=None, commands=()
         )
-        state = replace(state, watchdog=watchdog, axes=AxesWatch())
+        state = changed(state, watchdog=watchdog, axes=AxesWatch())
     if track in HOLDING:
-        state = replace(state, hold_from_tai_s=now_tai_s)
+        state = changed(state, hold_from_tai_s=now_tai_s)
     return state
 
 
@@ -169,7 +177,7 @@ def _are_registers_fresh(state: ControlState, now_tai_s: float) -> bool:
 def _remember(state: ControlState, extra: Command | None, now_tai_s: float) -> ControlState:
     if extra is None:
         return state
-    return replace(state, last_extra=extra, extra_after_tai_s=now_tai_s + EXTRA_REPEAT_S)
+    return changed(state, last_extra=extra, extra_after_tai_s=now_tai_s + EXTRA_REPEAT_S)
 
 
 def _write(
@@ -184,7 +192,7 @@ def _write(
         if passed.refusal:
             fields = {"reason": passed.refusal, "az_deg": wanted.az_deg, "el_deg": wanted.el_deg}
             events.append(Event("gate.refused", fields, is_warning=True))
-        state = replace(state, refusal=passed.refusal)
+        state = changed(state, refusal=passed.refusal)
     return _sent(state, passed, now_tai_s, config, is_followed=is_followed)
 
 
@@ -201,7 +209,7 @@ def _sent(
     is_regular = abs(since_s - config.period_s) < REGULAR_SHARE * config.period_s
     is_free = is_calm and is_settled and is_regular and is_followed and state.was_followed and not passed.is_held_back
     sent = Sent(az_deg, el_deg, is_free)
-    state = replace(
+    state = changed(
         state,
         axis_az=passed.az,
         axis_el=passed.el,

@@ -81,7 +81,7 @@ class Foreground:
 
     async def run(self) -> None:
         """Tick at the tenths of UTC seconds; a late tick is counted and skipped, never sent in a burst."""
-        period_s = self._config.period_s
+        period_s, log = self._config.period_s, self._log.bind()
         due_tai_s = math.ceil(self._clock.tai_s() / period_s + FIRST_SHARE) * period_s
         while True:
             await self._clock.sleep_until(due_tai_s)
@@ -99,7 +99,7 @@ class Foreground:
                 missed += 1  # two writes that near to each other would be a burst
             self.skipped_tick_count += missed
             due_tai_s = round(due_tai_s / period_s + 1 + missed) * period_s
-            self._log.debug("tick", late_ms=1e3 * late_s, skipped=missed, status=self._area.state.status)
+            log.debug("tick", late_ms=1e3 * late_s, skipped=missed, status=self._area.state.status)
 
     async def _hurry(self, due_tai_s: float) -> None:
         """While the start's exchanges are answered, the next one follows in the same tick if it fits."""
@@ -130,8 +130,14 @@ class Foreground:
     async def _tick(self) -> None:
         port, area = self._port, self._area
         port.drop_if_silent(LINK_SILENCE_S)
-        seen = replace(self._seen, silence_s=self._silence_s(), must_poll=port.must_poll, has_room=port.has_room)
-        seen, self._requests = replace(seen, requests=self._requests), ()
+        requests, self._requests = self._requests, ()
+        seen = replace(
+            self._seen,
+            silence_s=self._silence_s(),
+            must_poll=port.must_poll,
+            has_room=port.has_room,
+            requests=requests,
+        )
         now_tai_s = self._clock.tai_s()
         area.state, orders = tick(area.state, seen, area.sky, now_tai_s, self._config)
         self._report(orders.events)

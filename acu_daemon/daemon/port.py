@@ -13,7 +13,7 @@ from acu_daemon.edge.link import Link
 from acu_daemon.errors import LinkError
 from acu_daemon.protocol.exchange import HostExchange
 from acu_daemon.protocol.messages import Command, Poll, Reply, WriteAndPoll
-from acu_daemon.protocol.sa3842 import cycle_s, exchange_bytes
+from acu_daemon.protocol.sa3842 import exchange_bytes, reply_bytes
 
 EXCHANGE_DEADLINE_S = 0.090  # a reply is complete within this of the start of the write, ICD section 1
 CYCLE_SHARE = 0.95  # an exchange goes beside the write only if both fit into this share of the period, ICD section 6
@@ -41,6 +41,7 @@ class AcuPort:
         self._exchange = HostExchange(address)
         self._period_s = period_s
         self._latencies_s: deque[float] = deque([device_delay_s], maxlen=100)
+        self._both_count = sum(exchange_bytes(WriteAndPoll(0.0, 0.0))) + 1 + LONGEST_EXTRA + 1  # with an idle byte each
         self._log: Any = structlog.get_logger("link")
         self._reopen = asyncio.Event()
         self._up = asyncio.Event()
@@ -77,8 +78,7 @@ class AcuPort:
     @property
     def has_room(self) -> bool:
         """Whether the computed cycle leaves room for a second exchange beside the write (ICD section 6)."""
-        byte_s, latency_s = self._link.byte_time_s, max(self._latencies_s)
-        both_s = cycle_s((WriteAndPoll(0.0, 0.0),), byte_s, latency_s) + (LONGEST_EXTRA + 1) * byte_s + latency_s
+        both_s = self._both_count * self._link.byte_time_s + 2 * max(self._latencies_s)
         return both_s <= CYCLE_SHARE * self._period_s
 
     async def exchange(self, command: Command) -> Answer:
@@ -88,7 +88,9 @@ class AcuPort:
         reply: Reply | None = None
         try:
             self._link.drain_input()
-            self._link.write(self._exchange.begin(command))
+            frame = self._exchange.begin(command)
+            wire_s = (len(frame) + reply_bytes(command)) * self._link.byte_time_s
+            self._link.write(frame)
             for patience_s in (EXCHANGE_DEADLINE_S, 0.0):  # a loop that came late finds reply and deadline side by side
                 with contextlib.suppress(TimeoutError):
                     async with asyncio.timeout(patience_s):
@@ -104,7 +106,6 @@ class AcuPort:
             self.failed_exchange_count += 1
             return Answer(None, started_tai_s, None)
         self.last_reply_s = self._clock.monotonic_s()
-        wire_s = sum(exchange_bytes(command)) * self._link.byte_time_s
         self._latencies_s.append(max(0.0, self.last_reply_s - started_s - wire_s))
         first_byte_tai_s = None if first_byte_s is None else started_tai_s + first_byte_s - started_s
         return Answer(reply, started_tai_s, first_byte_tai_s)

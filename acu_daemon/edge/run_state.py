@@ -98,14 +98,13 @@ class RunStateKeeper:
     def see(self, state: ControlState) -> None:
         """Take the memory of a tick; it is written where it differs."""
         held = None if state.held is None else state.held.has_interlock_fault
-        seen = replace(
-            self._state, track=str(state.track), arming=state.arming, held=held, is_stow_kept=state.is_stow_kept
-        )
+        seen, last = (str(state.track), state.arming, held, state.is_stow_kept), self._state
         self._tick_count += 1
         is_retried = bool(self.problem) and self._tick_count % RETRY_TICKS == 0
-        if seen != self._state or is_retried:
-            self._state = seen
-            self._latest.offer((seen, self._fit))
+        if seen != (last.track, last.arming, last.held, last.is_stow_kept) or is_retried:
+            track, arming, held, is_stow_kept = seen
+            self._state = replace(last, track=track, arming=arming, held=held, is_stow_kept=is_stow_kept)
+            self._latest.offer((self._state, self._fit))
 
     def _save(self, newest: tuple[RunState, FitResult | None]) -> None:
         state, fit = newest

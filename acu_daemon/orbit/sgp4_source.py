@@ -1,5 +1,6 @@
 """SGP4/SDP4 through the sgp4 package, with the WGS72 constants element sets are made with."""
 
+from functools import lru_cache
 from math import pi
 from typing import Any
 
@@ -59,14 +60,13 @@ class Sgp4Propagator:
 
 
 def _satrec(elements: ElementSet, correction: Correction) -> Any:
-    day, fraction = utc_days(np.array(elements.epoch_tai_s))
     ellipse = corrected_ellipse(elements.eccentricity, elements.argp_rad, elements.mean_anomaly_rad, correction)
     satrec = Satrec()
     satrec.sgp4init(
         WGS72,
         "i",  # improved mode of AIAA 2006-6753
         0,  # the catalogue number takes no part, and large ones do not fit
-        float(day) - _DAY_ZERO_JD + float(fraction),
+        _epoch_days(elements.epoch_tai_s),
         elements.bstar_per_radius,
         0.0,  # the mean motion's derivatives take no part in SGP4
         0.0,
@@ -78,6 +78,12 @@ def _satrec(elements: ElementSet, correction: Correction) -> Any:
         (elements.raan_rad + correction.delta_raan_rad) % (2.0 * pi),
     )
     return satrec
+
+
+@lru_cache(maxsize=64)
+def _epoch_days(epoch_tai_s: float) -> float:
+    day, fraction = utc_days(np.array(epoch_tai_s))
+    return float(day) - _DAY_ZERO_JD + float(fraction)
 
 
 def _refusal(source: Sgp4Propagator, tai_s: float, code: int) -> str:

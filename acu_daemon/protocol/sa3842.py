@@ -245,8 +245,12 @@ def _command_event(frame: Frame) -> CommandEvent:
 
 def exchange_bytes(command: Command) -> tuple[int, int]:
     """Bytes of a command's frame and of its good reply, for the arithmetic of ICD section 6."""
-    out_count = OVERHEAD_BYTES + len(_command_data(command))
-    return out_count, OVERHEAD_BYTES + _REPLY_CHARS.get(CMD_OF[type(command)], 0)
+    return OVERHEAD_BYTES + len(_command_data(command)), reply_bytes(command)
+
+
+def reply_bytes(command: Command) -> int:
+    """Bytes of a command's good reply."""
+    return OVERHEAD_BYTES + _REPLY_CHARS.get(CMD_OF[type(command)], 0)
 
 
 def cycle_s(commands: tuple[Command, ...], byte_time_s: float, latency_s: float) -> float:
