@@ -88,15 +88,16 @@ def _order(
     state = changed(state, commands=(*state.commands[-2:], None))
     if not state.is_armed(config) and state.track is not TrackState.LINK_LOST:
         state = changed(_write(state, sky, now_tai_s, config, events)[0], commands=state.commands)
-    if extra is not None and (not seen.has_room or _needs_no_poll(state, now_tai_s)):
+    if extra is not None and (not seen.has_room or _needs_no_poll(state, extra, now_tai_s, config)):
         return _remember(state, extra, now_tai_s), Orders(extra, None, tuple(events))
     return _remember(state, extra, now_tai_s), Orders(Poll(), extra, tuple(events))
 
 
-def _needs_no_poll(state: ControlState, now_tai_s: float) -> bool:
-    """Whether the start may go on without another status: on a slow line each one costs it half a tick."""
+def _needs_no_poll(state: ControlState, extra: Command, now_tai_s: float, config: ControlConfig) -> bool:
+    """Whether it is the start's, which may go on without another status: on a slow line each costs it half a tick."""
     is_fresh = state.reading is not None and now_tai_s - state.reading.tai_s < FRESH_S
-    return state.stage is not Stage.READY and state.is_place_sure and is_fresh
+    is_of_start = state.stage is not Stage.READY and extra == next_command(state, config)
+    return is_of_start and state.is_place_sure and is_fresh
 
 
 def _may_write(state: ControlState, now_tai_s: float, config: ControlConfig) -> bool:
