@@ -62,8 +62,14 @@ def run(
         observed = replace(observed, reading=replace(observed.reading, tai_s=NOW + 0.1 * k))
         state, orders = tick(state, observed, FITTED, NOW + 0.1 * (k + 1), config)
         sent += [command for command in (orders.first, orders.extra) if command is not None]
-        extra = Exchange(orders.extra, replies.get(orders.extra, Ack())) if orders.extra is not None else None
+        asked = asked_by(orders)
+        extra = Exchange(asked, replies.get(asked, Ack())) if asked is not None else None
     return state, sent
+
+
+def asked_by(orders: Orders) -> Command | None:
+    """The exchange beside the poll or the write, or in its place."""
+    return orders.first if not isinstance(orders.first, Poll | WriteAndPoll) else orders.extra
 
 
 def orders_of(sent: list[Command]) -> list[Command]:
@@ -98,7 +104,7 @@ def test_p1_armed_again_it_begins_with_the_present_angles() -> None:
     state, orders = tick(state, armed, FITTED, NOW + 5.0, GUARDED)
     assert state.is_armed(GUARDED)
     assert state.stage is Stage.REGISTERS_KNOWN
-    assert (orders.first, orders.extra) == (Poll(), ReadParameter("S"))
+    assert asked_by(orders) == ReadParameter("S")
 
 
 def test_p1_a_shadow_is_never_armed() -> None:
@@ -152,9 +158,10 @@ def test_p6_a_restart_with_a_latch_knows_the_acu_stops_the_antenna_once_and_move
     state, sent, extra = ControlState(latch=LATCH, is_stop_due=True), [], None
     for k in range(30):
         state, orders = tick(state, saw(status(AcuMode.REMOTE), extra=extra), FITTED, NOW + 0.1 * k, GUARDED)
-        reply = Identity("3842", "S1") if isinstance(orders.extra, Identify) else Ack()
-        extra = Exchange(orders.extra, reply) if orders.extra is not None else None
-        sent += [orders.extra] if orders.extra is not None else []
+        asked = asked_by(orders)
+        reply = Identity("3842", "S1") if isinstance(asked, Identify) else Ack()
+        extra = Exchange(asked, reply) if asked is not None else None
+        sent += [asked] if asked is not None else []
     assert sent[:2] == [Identify(), Stop()]
     assert orders_of(sent) == [Stop()]
     assert (state.track, state.latch) == (TrackState.FAULT, LATCH)

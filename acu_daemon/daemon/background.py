@@ -51,7 +51,7 @@ class Background:
         self._low_water_s = low_water_s
         self._preposition_s = preposition_s
         self._on_fit = on_fit
-        self._wake = asyncio.Event()
+        self._due = asyncio.Event()
         self._last_tai_s = -1e18
         self._has_asked = False
         self._died_count = 0  # in a row
@@ -66,14 +66,14 @@ class Background:
 
     def wake(self) -> None:
         """Look whether a refit is due.  Called by the foreground after every tick; never blocks."""
-        self._wake.set()
+        if self._is_due():
+            self._due.set()
 
     async def run(self) -> None:
         while True:
-            await self._wake.wait()
-            self._wake.clear()
-            if self._is_due():
-                await self._refit()
+            await self._due.wait()
+            self._due.clear()
+            await self._refit()
 
     def _is_due(self) -> bool:
         """At once when the pass is near and on a loss; each second while locked; at low water."""

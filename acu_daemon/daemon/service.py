@@ -94,8 +94,9 @@ class Service:
         self._on_state = on_state
         self._on_end = on_end
         self._files_alarm = files_alarm
-        self._ticked = asyncio.Event()
+        self._is_over = asyncio.Event()
         self._stop_reason = ""
+        self._started_tai_s = math.inf
         self._log: Any = structlog.get_logger("pass")
         is_stop_due = job.state.is_stop_due and job.state.is_armed(job.control)  # else the antenna is not ours
         self._area = CommonArea(state=replace(job.state, is_stop_due=is_stop_due))
@@ -142,33 +143,30 @@ class Service:
         return self._outcome(reason, is_stopped)
 
     async def _track(self) -> str:
+        self._started_tai_s = self._clock.tai_s()
         async with asyncio.TaskGroup() as inner:
             tasks = [
                 inner.create_task(self._foreground.run(), name="foreground"),
                 inner.create_task(self._background.run(), name="background"),
             ]
-            reason = await self._supervise()
+            await self._is_over.wait()
             for task in tasks:
                 task.cancel()
-        return reason
+        return self._stop_reason
 
-    async def _supervise(self) -> str:
-        """Watch tick after tick until the run is over; say why it is."""
-        started_tai_s = self._clock.tai_s()
-        while True:
-            await self._ticked.wait()
-            self._ticked.clear()
-            if self._stop_reason:
-                return self._stop_reason
-            now_tai_s = self._clock.tai_s()
-            if now_tai_s >= self._job.end_tai_s:
-                return "duration over"
-            self._check_acu(now_tai_s - started_tai_s)
-            sky = self._area.sky
-            if sky.plan is None:
-                self._plan(now_tai_s)
-            elif now_tai_s > pass_end_tai_s(sky.plan, sky):
-                return "pass over"
+    def _supervise(self, now_tai_s: float) -> None:
+        """Look after a tick whether the run is over, and plan the pass as soon as it can be planned."""
+        sky = self._area.sky
+        if now_tai_s >= self._job.end_tai_s:
+            self.stop("duration over")
+        elif sky.plan is not None and now_tai_s > pass_end_tai_s(sky.plan, sky):
+            self.stop("pass over")
+        if self._stop_reason:
+            self._is_over.set()
+            return
+        self._check_acu(now_tai_s - self._started_tai_s)
+        if sky.plan is None:
+            self._plan(now_tai_s)
 
     def _check_acu(self, elapsed_s: float) -> None:
         if self._area.state.status is None and elapsed_s > FIRST_POLL_S:
@@ -214,8 +212,8 @@ class Service:
             self._on_state(replace(self._area.state, held=None))
 
     def _after_tick(self) -> None:
+        self._supervise(self._clock.tai_s())
         self._background.wake()
-        self._ticked.set()
         if self._on_state is not None:
             self._on_state(self._area.state)
         if self._on_snapshot is not None and self._foreground.tick_count % self._snapshot_ticks == 0:
