@@ -63,7 +63,7 @@ def tick(
     state = respect_interlock(state, seen, config, events)
     state = let_be(watch_antenna(state, seen, config, events))
     state = note_held(_walk(state, seen, sky, now_tai_s, config, events), config)
-    is_write_owed = before.stage is Stage.READY and bool(before.commands) and before.commands[-1] is None
+    is_write_owed = bool(before.commands) and before.commands[-1] is None
     state, orders = _order(state, seen, sky, now_tai_s, config, events, is_write_owed=is_write_owed)
     return fence(state, orders, config)
 
