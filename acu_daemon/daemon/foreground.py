@@ -130,6 +130,9 @@ class Foreground:
     async def _tick(self) -> None:
         port, area = self._port, self._area
         port.drop_if_silent(LINK_SILENCE_S)
+        first = port.take_first()
+        if first is not None and isinstance(first.reply, Status):
+            self._take_status(first, first.reply, Poll())
         requests, self._requests = self._requests, ()
         seen = replace(
             self._seen,

@@ -45,6 +45,7 @@ class AcuPort:
         self._log: Any = structlog.get_logger("link")
         self._reopen = asyncio.Event()
         self._up = asyncio.Event()
+        self._first: Answer | None = None
         self.problem = ""
         self.last_reply_s = clock.monotonic_s()
         self.connect_count = 0
@@ -135,7 +136,7 @@ class AcuPort:
                 self.attempt_count += 1
                 try:
                     await self._link.open()
-                    await self._first_poll()
+                    first = await self._first_poll()
                 except LinkError as error:
                     if str(error) != reported:
                         reported = str(error)
@@ -150,6 +151,7 @@ class AcuPort:
                 self.connect_count += 1
                 self._log.info("link.open", link=self._link.description)
                 self._reopen.clear()
+                self._first = first
                 self._up.set()
                 await self._reopen.wait()
                 self._log.warning("link.lost", link=self._link.description, reason=self.problem)
@@ -158,16 +160,21 @@ class AcuPort:
             self._up.clear()
             await self._link.close()
 
-    async def _first_poll(self) -> None:
+    async def _first_poll(self) -> Answer:
         """A link counts as up when the ACU has answered on it once."""
         self._exchange, self.problem = HostExchange(self._address), ""
         for _ in range(3):
             answer = await self.exchange(Poll())
             if answer.reply is not None:
-                return
+                return answer
             if self.problem:
                 raise LinkError(self.problem)
         raise LinkError(f"{self._link.description} is open, but no ACU answers a poll")
+
+    def take_first(self) -> Answer | None:
+        """Give the answer that showed the link to be up, once."""
+        first, self._first = self._first, None
+        return first if self.is_up else None
 
     def abandon(self) -> None:
         """Give up an exchange whose waiter was cancelled, so that the next one starts clean."""
