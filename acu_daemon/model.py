@@ -233,4 +233,4 @@ def sky_angle_deg(az1_deg: float, el1_deg: float, az2_deg: float, el2_deg: float
     """Angle on the sky between two directions, well conditioned for small angles (haversine)."""
     d_el, d_az = radians(el2_deg - el1_deg), radians(az2_deg - az1_deg)
     h = sin(d_el / 2) ** 2 + cos(radians(el1_deg)) * cos(radians(el2_deg)) * sin(d_az / 2) ** 2
-    return degrees(2 * asin(min(1.0, sqrt(h))))
+    return degrees(2 * asin(min(1.0, sqrt(max(0.0, h)))))  # beyond the zenith and before it: rounding

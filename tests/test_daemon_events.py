@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
+from functools import partial
 
 import pytest
 from flights import (
@@ -591,6 +592,19 @@ def test_p7_a_step_of_the_system_clock_is_reported_once_and_not_obeyed() -> None
 
 
 # A slow line
+
+
+@pytest.mark.parametrize(("baud", "latency_s"), [(9600, 0.013), (9600, 0.002), (19200, 0.010), (0, 0.020)])
+def test_p8_a_start_with_several_exchanges_in_a_tick_makes_the_next_tick_no_later(baud: int, latency_s: float) -> None:
+    def ask(stage: Stage, line: str) -> None:
+        assert stage.service.answer(line).startswith("ok ")
+
+    script = [(3.0 + k * 0.973, partial(ask, line=("disarm", "arm")[k % 2])) for k in range(12)]
+    antenna = AcuChoice(azimuth_deg=168.0, elevation_deg=20.0, reply_latency_s=latency_s)
+    flight = climb(16.0, antenna=antenna, byte_time_s=10 / baud if baud else 0.0, script=script)
+    assert flight.outcome is not None
+    assert flight.outcome.skipped_tick_count == 0
+    assert flight.outcome.is_stopped
 
 
 @pytest.mark.parametrize("latency_s", [0.002, 0.010, 0.020])

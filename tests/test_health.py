@@ -2,12 +2,12 @@
 
 from dataclasses import replace
 
-from flights import RISING_TAI_S, climb
+from flights import RISING_ANTENNA, RISING_TAI_S, climb
 from test_live_line import SEEN
 
 from acu_daemon.daemon.health import FEED_S, Health
 from acu_daemon.daemon.snapshot import Snapshot
-from acu_daemon.protocol.messages import Command, Reply, WriteAndPoll
+from acu_daemon.protocol.messages import Command, Identity, ReadParameter, Reply, WriteAndPoll, WriteParameter
 from acu_daemon.sim.acu import FakeAcu
 
 ALIVE = "WATCHDOG=1"
@@ -75,3 +75,20 @@ def test_p4_polls_after_writes_that_nobody_answers_are_no_work_done() -> None:
     assert len(done) > 20
     assert len(set(done)) == 1
     assert flight.snapshots[-1].is_link_up
+
+
+class NoParameters(FakeAcu):
+    """Gives no good reply to what concerns its parameters."""
+
+    def answer(self, command: Command) -> Reply:
+        reply = super().answer(command)
+        return Identity("none", "") if isinstance(command, ReadParameter | WriteParameter) else reply
+
+
+def test_p4_a_daemon_whose_start_gets_no_further_is_still_alive() -> None:
+    """It records and shows; to start it again for ever would help nobody."""
+    antenna = replace(RISING_ANTENNA, reply_latency_s=0.002)
+    flight = climb(10.0, make_acu=NoParameters, antenna=antenna)
+    done = [seen.answered_count for seen in flight.snapshots if seen.tai_s > RISING_TAI_S + 3.0]
+    assert len(done) > 60
+    assert all(later > before for before, later in zip(done, done[20:], strict=False))

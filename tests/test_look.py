@@ -127,3 +127,8 @@ def test_a_stretch_of_path_is_interpolated_to_a_centimetre(source: Propagator, s
     off_m = np.radians(np.hypot(east_deg, along.el_deg - seen.el_deg)) * seen.range_m
     assert off_m.max() < 0.01
     assert np.abs(along.el_rate_deg_s - seen.el_rate_deg_s).max() < 1e-7
+
+
+@given(st.floats(0.0, 360.0), st.floats(0.0, 90.0))
+def test_one_direction_before_and_beyond_the_zenith_is_no_angle_apart(az_deg: float, el_deg: float) -> None:
+    assert sky_angle_deg(az_deg, el_deg, az_deg + 180.0, 180.0 - el_deg) < 1e-5

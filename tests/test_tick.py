@@ -235,11 +235,11 @@ def test_a_signal_that_was_never_locked_is_searched_for_after_acquire_s(has_lock
 
 def test_silence_of_the_link_makes_everything_start_anew() -> None:
     seen = status()
-    state, orders = tick(
-        ready(TrackState.AUTOTRACK_FITTED, seen), Observation(silence_s=LINK_SILENCE_S + 0.01), FITTED, NOW, CONFIG
-    )
+    state = replace(ready(TrackState.AUTOTRACK_FITTED, seen), is_place_sure=True)
+    state, orders = tick(state, Observation(silence_s=LINK_SILENCE_S + 0.01), FITTED, NOW, CONFIG)
     assert state.track is TrackState.LINK_LOST
     assert state.stage is Stage.NEW
+    assert not state.is_place_sure  # on a fresh connection the place of the old one is not written
     assert orders.first == Poll()
     assert orders.extra in (None, Identify())
 

@@ -200,7 +200,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Orders:
-    """What this tick sends: one exchange that brings a status, and at most one beside it or in the next one's place."""
+    """What this tick sends: an exchange that brings a status, and at most one beside it; or that one in its place."""
 
     first: Command
     extra: Command | None = None

@@ -109,7 +109,7 @@ class Foreground:
             and self._has_news()
             and self._port.is_up
             and not self._port.must_poll
-            and self._next_answer_tai_s(begun_tai_s) < end_tai_s
+            and self._clock.tai_s() + self._next_s(begun_tai_s) < end_tai_s
         ):
             begun_tai_s = self._clock.tai_s()
             self._after_tick()  # a refused rehearsal ends before the first write
@@ -122,10 +122,11 @@ class Foreground:
             return self._seen.status is not None and self._area.state.status is None
         return not isinstance(self._seen.extra.reply, Nak | None)
 
-    def _next_answer_tai_s(self, begun_tai_s: float) -> float:
-        """When the next exchange would be over: it takes as long as the last one; an identity may be twice as long."""
-        now_tai_s = self._clock.tai_s()
-        return now_tai_s + (1.0 if self._seen.extra is not None else 2.0) * (now_tai_s - begun_tai_s)
+    def _next_s(self, begun_tai_s: float) -> float:
+        """How long the next decision's exchanges take: one of the start's alone as long as the last, else the most."""
+        state = self._area.state
+        is_alone = state.is_place_sure and Stage.NEW < state.stage < Stage.PRESENT_WRITTEN
+        return self._clock.tai_s() - begun_tai_s if is_alone else self._port.both_s
 
     async def _tick(self) -> None:
         port, area = self._port, self._area
@@ -148,7 +149,8 @@ class Foreground:
         if not port.is_up:
             return
         is_answered = await self._do(orders.first)
-        self.answered_count += is_answered and not seen.must_poll  # a poll after a failure is no progress
+        is_progress = not seen.must_poll or area.state.stage is not Stage.READY  # no poll in the place of a write
+        self.answered_count += is_answered and is_progress
         if orders.extra is not None and port.is_up and not port.must_poll:
             await port.idle_gap()
             await self._do(orders.extra)

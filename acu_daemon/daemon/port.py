@@ -79,8 +79,12 @@ class AcuPort:
     @property
     def has_room(self) -> bool:
         """Whether the computed cycle leaves room for a second exchange beside the write (ICD section 6)."""
-        both_s = self._both_count * self._link.byte_time_s + 2 * max(self._latencies_s)
-        return both_s <= CYCLE_SHARE * self._period_s
+        return self.both_s <= CYCLE_SHARE * self._period_s
+
+    @property
+    def both_s(self) -> float:
+        """Computed time of a write and the longest exchange beside it."""
+        return self._both_count * self._link.byte_time_s + 2 * max(self._latencies_s)
 
     async def exchange(self, command: Command) -> Answer:
         """Send a command and wait for its reply until the deadline; a dead link is reported and reopened by `keep`."""
