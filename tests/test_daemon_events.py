@@ -594,6 +594,12 @@ def test_p7_a_step_of_the_system_clock_is_reported_once_and_not_obeyed() -> None
 # A slow line
 
 
+def test_p4_at_9600_baud_a_start_comes_to_its_first_write_of_the_path_in_half_a_second() -> None:
+    flight = climb(3.0, antenna=AcuChoice(azimuth_deg=168.0, elevation_deg=20.0), byte_time_s=10 / 9600)
+    first_write_tai_s = next(tai_s for tai_s, command in flight.commands if isinstance(command, WriteAndPoll))
+    assert first_write_tai_s - flight.commands[0][0] < 0.5
+
+
 @pytest.mark.parametrize(("baud", "latency_s"), [(9600, 0.013), (9600, 0.002), (19200, 0.010), (0, 0.020)])
 def test_p8_a_start_with_several_exchanges_in_a_tick_makes_the_next_tick_no_later(baud: int, latency_s: float) -> None:
     def ask(stage: Stage, line: str) -> None:
