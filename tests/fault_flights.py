@@ -14,7 +14,7 @@ from acu_daemon.units import wrap_180
 T = RISING_TAI_S
 LOST_S, FAULT_S, BACK_S = 11.0, 14.0, 23.0  # the signal goes, the fault begins, the signal comes back
 ON_PATH_DEG = 0.1
-BURST_S = 0.015  # two register writes nearer than this are a burst: a start's first two, alike, are 20 ms apart
+BURST_S = 0.030  # two register writes nearer than this are a burst; a late tick may halve the period, no more
 ROUNDING_S = 1e-6  # of differences of TAI
 STALE_S = 0.1  # a register write that was applied so long after it was sent
 
@@ -208,7 +208,8 @@ def sent_writes(flight: Flight) -> list[tuple[float, float, float]]:
 
 
 def write_gaps_s(flight: Flight) -> list[float]:
-    times = [tai_s for tai_s, _, _ in sent_writes(flight)]
+    """Between writes of the path; a start's present angles go before the first."""
+    times = [tai_s for tai_s, command in flight.commands if isinstance(command, WriteAndPoll)]
     return [b - a for a, b in zip(times, times[1:], strict=False)]
 
 
