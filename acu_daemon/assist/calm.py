@@ -2,17 +2,31 @@
 
 import numpy as np
 
-from acu_daemon.assist.offsets import Flags, Offsets
+from acu_daemon.assist.encoder import encoder_look
+from acu_daemon.assist.offsets import Flags, propagator_of
 from acu_daemon.assist.settings import EstimatorSettings
+from acu_daemon.model import FitResult, Site
+from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.units import Array
 
 LIMIT_SHARE = 0.3  # of the drive's acceleration: beyond it autotrack lags
+HALF_STEP_S = 0.25  # of the difference of rates that gives a path's acceleration
 
 
-def is_calm(seen: Offsets, settings: EstimatorSettings) -> Flags:
-    """Say of each reading whether the path leaves both axes calm; all are where nobody knows the drives."""
+def is_calm(
+    source: Propagator, site: Site, fit: FitResult | None, tai_s: Array, settings: EstimatorSettings
+) -> Flags:
+    """Say of each time (N,) whether the path leaves both axes calm; all do where nobody knows the drives.
+
+    Raises:  OrbitError: the source has no answer for one of the times.
+    """
+    count = tai_s.size
     if settings.azimuth is None or settings.elevation is None:
-        return np.ones(seen.tai_s.size, dtype=np.bool_)
-    calm: Flags = (np.abs(seen.az_deg_s2) <= LIMIT_SHARE * settings.azimuth.max_acceleration_deg_s2) & (
-        np.abs(seen.el_deg_s2) <= LIMIT_SHARE * settings.elevation.max_acceleration_deg_s2
-    )
+        return np.ones(count, dtype=np.bool_)
+    around = np.concatenate((tai_s - HALF_STEP_S, tai_s + HALF_STEP_S))
+    path = encoder_look(propagator_of(source, fit), around, site, fit)
+    calm = np.ones(count, dtype=np.bool_)
+    for rate_deg_s, axis in ((path.az_rate_deg_s, settings.azimuth), (path.el_rate_deg_s, settings.elevation)):
+        acceleration_deg_s2 = (rate_deg_s[count:] - rate_deg_s[:count]) / (2.0 * HALF_STEP_S)
+        calm &= np.abs(acceleration_deg_s2) <= LIMIT_SHARE * axis.max_acceleration_deg_s2
     return calm

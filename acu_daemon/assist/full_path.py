@@ -35,7 +35,7 @@ class Curve:
         """Give (..., N, 3)."""
         step = self.node_tai_s[1] - self.node_tai_s[0]
         x = (tai_s - self.node_tai_s[0]) / step
-        i = np.clip(x.astype(np.int64), 0, self.node_tai_s.size - 2)
+        i = np.minimum(np.maximum(x.astype(np.int64), 0), self.node_tai_s.size - 2)  # np.clip takes 5 times as long
         u = (x - i)[:, None]
         v = 1.0 - u
         first, second = self.value.take(i, axis=-2), self.value.take(i + 1, axis=-2)

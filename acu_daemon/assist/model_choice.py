@@ -48,8 +48,13 @@ def choose(before: ModelChoice, residuals_deg: dict[Model, float], noise_deg: fl
     if Model.NEW_FIT not in residuals_deg:
         return ModelChoice(best)
     left_deg = residuals_deg[Model.NEW_FIT]
-    is_bad = left_deg > BAD_SIGMAS * noise_deg and left_deg > BAD_RATIO * residuals_deg[best]
+    is_bad = not is_good(left_deg, noise_deg) and left_deg > BAD_RATIO * residuals_deg[best]
     return ModelChoice(best, before.bad_count + 1) if is_bad else ModelChoice(Model.NEW_FIT)
+
+
+def is_good(residual_deg: float, noise_deg: float) -> bool:
+    """Whether a new fit wins, whatever the others leave."""
+    return residual_deg <= BAD_SIGMAS * noise_deg
 
 
 def newest_residual_deg(source: Propagator, site: Site, fit: FitResult | None, readings: Readings) -> float:

@@ -1,6 +1,6 @@
-"""Readings against a predicted path: how far off, how far off may be, how the path accelerates.  Pure."""
+"""Readings against a predicted path: how far off, and how far off may be.  Pure."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -8,6 +8,7 @@ import numpy.typing as npt
 from acu_daemon.assist.encoder import encoder_look, sigma_deg
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import FitResult, Readings, Site
+from acu_daemon.orbit.look import Look, look_along
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import Array, wrap_180_array
 
@@ -15,7 +16,6 @@ Flags = npt.NDArray[np.bool_]
 
 NEAR_BEAMS = 0.2
 NEAR_SIGMAS = 6.0
-HALF_STEP_S = 0.25  # of the difference of rates that gives a path's acceleration
 LEAST_COS_EL = 1e-3
 LEAST_SPAN_S = 0.5  # a drift is taken over
 
@@ -24,17 +24,13 @@ LEAST_SPAN_S = 0.5  # a drift is taken over
 class Offsets:
     """Readings minus a path, every array (N,): degrees on the sky, right (azimuth rising) and up positive.
 
-    near_deg: how far off is still near, by the noise and the path's own sigma.  The accelerations are the path's,
-    deg/s^2 of the axes.
+    near_deg: how far off is still near, by the noise and, unless all are near without it, the path's own sigma.
     """
 
     tai_s: Array
     right_deg: Array
     up_deg: Array
-    cos_el: Array
     near_deg: Array
-    az_deg_s2: Array
-    el_deg_s2: Array
 
     @property
     def angle_deg(self) -> Array:
@@ -66,22 +62,18 @@ def offsets(
 
     Raises:  OrbitError: the source has no answer for one of the times.
     """
-    propagator = _propagator(source, fit)
-    t, count = readings.tai_s, len(readings)
-    seen = encoder_look(propagator, np.concatenate((t, t - HALF_STEP_S, t + HALF_STEP_S)), site, fit)
-    cos_el, right_deg, up_deg = _on_the_sky(readings, seen.az_deg[:count], seen.el_deg[:count])
-    of_path_deg = sigma_deg(propagator, t, site, fit)
+    propagator = propagator_of(source, fit)
+    right_deg, up_deg = _on_the_sky(readings, encoder_look(propagator, readings.tai_s, site, fit, look_along))
     noise_deg = max(settings.sigma_azimuth_deg, settings.sigma_elevation_deg)
-    spread_deg = noise_deg if of_path_deg is None else np.hypot(noise_deg, of_path_deg)
-    return Offsets(
-        tai_s=t,
-        right_deg=right_deg,
-        up_deg=up_deg,
-        cos_el=cos_el,
-        near_deg=np.maximum(NEAR_BEAMS * settings.beamwidth_deg, NEAR_SIGMAS * spread_deg) * np.ones(count),
-        az_deg_s2=(seen.az_rate_deg_s[2 * count :] - seen.az_rate_deg_s[count : 2 * count]) / (2 * HALF_STEP_S),
-        el_deg_s2=(seen.el_rate_deg_s[2 * count :] - seen.el_rate_deg_s[count : 2 * count]) / (2 * HALF_STEP_S),
-    )
+    least_deg = NEAR_BEAMS * settings.beamwidth_deg
+    near_deg = np.full(len(readings), max(least_deg, NEAR_SIGMAS * noise_deg))
+    seen = Offsets(readings.tai_s, right_deg, up_deg, near_deg)
+    if bool(seen.is_near.all()):
+        return seen
+    of_path_deg = sigma_deg(propagator, readings.tai_s, site, fit)
+    if of_path_deg is None:
+        return seen
+    return replace(seen, near_deg=np.maximum(least_deg, NEAR_SIGMAS * np.hypot(noise_deg, of_path_deg)))
 
 
 def angles_deg(source: Propagator, site: Site, fit: FitResult | None, readings: Readings) -> Array:
@@ -89,17 +81,16 @@ def angles_deg(source: Propagator, site: Site, fit: FitResult | None, readings: 
 
     Raises:  OrbitError: the source has no answer for one of the times.
     """
-    seen = encoder_look(_propagator(source, fit), readings.tai_s, site, fit)
-    _, right_deg, up_deg = _on_the_sky(readings, seen.az_deg, seen.el_deg)
-    angle: Array = np.hypot(right_deg, up_deg)
+    angle: Array = np.hypot(*_on_the_sky(readings, encoder_look(propagator_of(source, fit), readings.tai_s, site, fit)))
     return angle
 
 
-def _propagator(source: Propagator, fit: FitResult | None) -> Propagator:
+def propagator_of(source: Propagator, fit: FitResult | None) -> Propagator:
+    """The source as a fit corrects it."""
     return source if fit is None else source.corrected(fit.correction)
 
 
-def _on_the_sky(readings: Readings, az_deg: Array, el_deg: Array) -> tuple[Array, Array, Array]:
-    """Cosine of the path's elevation; readings minus path, right and up."""
-    cos_el = np.maximum(np.cos(np.radians(el_deg)), LEAST_COS_EL)
-    return cos_el, wrap_180_array(readings.az_deg - az_deg) * cos_el, readings.el_deg - el_deg
+def _on_the_sky(readings: Readings, path: Look) -> tuple[Array, Array]:
+    """Readings minus path, right and up."""
+    cos_el = np.maximum(np.cos(np.radians(path.el_deg)), LEAST_COS_EL)
+    return wrap_180_array(readings.az_deg - path.az_deg) * cos_el, readings.el_deg - path.el_deg

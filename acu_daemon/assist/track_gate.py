@@ -107,7 +107,7 @@ class TrackGate:
         taken = Taken()
         if len(good):
             seen = self._offsets(good, fit)
-            calm = is_calm(seen, self._settings)
+            calm = is_calm(self._source, self._site, fit, good.tai_s, self._settings)
             reasons[ACCELERATION] = self._leave_out(good.part(~calm), ACCELERATION)
             if fit is None:
                 taken = self._first(good.part(calm))
@@ -199,8 +199,7 @@ class TrackGate:
         if len(asked) == 0:
             return False
         recent = self._wander.asked(asked)
-        path = replace(fit, covariance=None)  # its sigma is of no use here, and slow
-        return seconds(self.kept) >= YOUNG_S and self._wander.denies(self.kept, self._offsets(recent, path))
+        return seconds(self.kept) >= YOUNG_S and self._wander.denies(self.kept, self._offsets(recent, fit))
 
     def _leave_wanderers(self, off: Readings, fit: FitResult) -> Taken:
         """Leave out what was kept of the window that wanders; go on with the readings farther off."""

@@ -11,7 +11,7 @@ from acu_daemon.assist.carry_over import CarryOver, aged_prior, first_fit
 from acu_daemon.assist.estimator import Estimator, EstimatorSettings, has_covariance, make_estimator
 from acu_daemon.assist.full import FullEstimator, shift_for_people
 from acu_daemon.assist.gate import OUTLIER
-from acu_daemon.assist.model_choice import Model, ModelChoice, choose, newest_residual_deg
+from acu_daemon.assist.model_choice import Model, ModelChoice, choose, is_good, newest_residual_deg
 from acu_daemon.assist.prediction import predict
 from acu_daemon.assist.spans import span_s
 from acu_daemon.assist.track_gate import TrackGate
@@ -177,10 +177,12 @@ class Refitter:
         if len(kept) == 0:
             self._choice = ModelChoice(list(models)[-1])
         elif has_news:
-            residuals_deg = {
-                model: newest_residual_deg(setup.propagator, setup.site, fit, kept) for model, fit in models.items()
-            }
             noise_deg = max(setup.settings.sigma_azimuth_deg, setup.settings.sigma_elevation_deg)
+            residuals_deg: dict[Model, float] = {}
+            for model in sorted(models, key=lambda one: one is not Model.NEW_FIT):  # the others only if it is not good
+                residuals_deg[model] = newest_residual_deg(setup.propagator, setup.site, models[model], kept)
+                if model is Model.NEW_FIT and is_good(residuals_deg[model], noise_deg):
+                    break
             self._choice = choose(self._choice, residuals_deg, noise_deg)
 
     def _reply(

@@ -42,9 +42,7 @@ def itrs_from_teme(
     Args:    r_teme_m, v_teme_m_s: (N, 3); tai_s: (N,).
     Returns: r_itrs_m, v_itrs_m_s: (N, 3); the velocity is that seen by an observer who turns with the Earth.
     """
-    theta = gmst_rad(tai_s, orientation.ut1_utc_s)
-    r_pef_m = _turn_z(r_teme_m, theta)
-    v_pef_m_s = _turn_z(v_teme_m_s, theta)
+    r_pef_m, v_pef_m_s = _turn_z(gmst_rad(tai_s, orientation.ut1_utc_s), r_teme_m, v_teme_m_s)
     v_pef_m_s[:, 0] += EARTH_RATE_RAD_S * r_pef_m[:, 1]
     v_pef_m_s[:, 1] -= EARTH_RATE_RAD_S * r_pef_m[:, 0]
     if orientation.polar_x_arcsec == 0.0 and orientation.polar_y_arcsec == 0.0:
@@ -56,7 +54,8 @@ def itrs_from_teme(
 def teme_from_itrs(r_itrs_m: Array, tai_s: Array, orientation: EarthOrientation) -> Array:
     """Turn Earth-fixed positions (N, 3) or one (3,) into TEME positions (N, 3) at the times (N,)."""
     r_pef_m = np.broadcast_to(r_itrs_m @ _itrs_from_pef(orientation), (tai_s.size, 3))
-    return _turn_z(r_pef_m, -gmst_rad(tai_s, orientation.ut1_utc_s))
+    (r_teme_m,) = _turn_z(-gmst_rad(tai_s, orientation.ut1_utc_s), r_pef_m)
+    return r_teme_m
 
 
 def teme_from_itrs_states(
@@ -67,17 +66,19 @@ def teme_from_itrs_states(
     r_pef_m, v_pef_m_s = r_itrs_m @ pef, v_itrs_m_s @ pef
     v_pef_m_s[:, 0] -= EARTH_RATE_RAD_S * r_pef_m[:, 1]
     v_pef_m_s[:, 1] += EARTH_RATE_RAD_S * r_pef_m[:, 0]
-    theta = -gmst_rad(tai_s, orientation.ut1_utc_s)
-    return _turn_z(r_pef_m, theta), _turn_z(v_pef_m_s, theta)
+    r_teme_m, v_teme_m_s = _turn_z(-gmst_rad(tai_s, orientation.ut1_utc_s), r_pef_m, v_pef_m_s)
+    return r_teme_m, v_teme_m_s
 
 
-def _turn_z(vectors: Array, angle_rad: Array) -> Array:
-    """Coordinates of (N, 3) vectors in a frame turned by the angles (N,) about the z axis."""
+def _turn_z(angle_rad: Array, *vectors: Array) -> list[Array]:
+    """Coordinates of vectors, (N, 3) each, in a frame turned by the angles (N,) about the z axis."""
     c, s = np.cos(angle_rad), np.sin(angle_rad)
-    turned = np.empty_like(vectors)
-    turned[:, 0] = c * vectors[:, 0] + s * vectors[:, 1]
-    turned[:, 1] = c * vectors[:, 1] - s * vectors[:, 0]
-    turned[:, 2] = vectors[:, 2]
+    turned = []
+    for one in vectors:
+        x, y = one[:, 0], one[:, 1]
+        new = one.copy()
+        new[:, 0], new[:, 1] = c * x + s * y, c * y - s * x
+        turned.append(new)
     return turned
 
 

@@ -11,6 +11,7 @@ from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import DEG, Array
 
 NODE_S, LEAST_NODES = 20.0, 8  # the orbit between: to 1 mm, as near as the times themselves are rounded
+WORTH_COUNT = 16  # times for a node: fewer are faster without
 _ZENITH_M2 = 1e-12  # keeps azimuth and its rate finite (0) exactly overhead, where neither exists
 
 
@@ -66,7 +67,7 @@ def look_along(propagator: Propagator, tai_s: Array, site: Site) -> Look:
     Raises:  OrbitError: the propagator has no answer for one of the times.
     """
     node_count = LEAST_NODES + int((tai_s[-1] - tai_s[0]) / NODE_S)
-    if node_count >= tai_s.size:
+    if tai_s.size < WORTH_COUNT * node_count:
         return look_at(propagator, tai_s, site)
     middle_s, half_s = (tai_s[-1] + tai_s[0]) / 2.0, (tai_s[-1] - tai_s[0]) / 2.0
     points = -np.cos(np.linspace(0.0, np.pi, node_count))

@@ -92,14 +92,19 @@ def utc_text(tai_s: float, digits: int = 3) -> str:
     return f"{day.isoformat()}T{minutes // 60:02d}:{minutes % 60:02d}:{second + is_leap:02d}{tail}Z"
 
 
+def _utc_s(tai_s: Array) -> Array:
+    """UTC seconds since 2000-01-01T12:00:00, every day counted as 86400 s."""
+    utc_s: Array = tai_s - np.maximum(10, 9 + _STEPS_TAI_ARRAY.searchsorted(tai_s, side="right"))
+    return utc_s
+
+
 def utc_days(tai_s: Array) -> tuple[Array, Array]:
     """Turn TAI into UTC Julian days.
 
     Returns: the day's begin (ends in .5) and the fraction of the day in [0, 1), of the shape of `tai_s`.
              A leap second repeats the fractions of the second after it.
     """
-    offset_s = np.maximum(10, 9 + np.searchsorted(_STEPS_TAI_ARRAY, tai_s, side="right"))
-    utc_s = tai_s - offset_s
+    utc_s = _utc_s(tai_s)
     days = np.floor(utc_s / DAY_S + 0.5) - 0.5
     return days + _J2000_JD, utc_s / DAY_S - days
 
@@ -109,8 +114,7 @@ def gmst_rad(tai_s: Array, ut1_utc_s: float) -> Array:
 
     Source:  IAU 1982 (Aoki et al., A&A 105, 359), as in Vallado, Fundamentals of Astrodynamics, eq 3-45.
     """
-    day, fraction = utc_days(tai_s)
-    ut1_days = (day - _J2000_JD) + (fraction + ut1_utc_s / DAY_S)
+    ut1_days = (_utc_s(tai_s) + ut1_utc_s) / DAY_S
     t = ut1_days / 36525.0
     seconds = 67310.54841 + t * (8640184.812866 + t * (0.093104 - 6.2e-6 * t))
     turns: Array = (seconds / DAY_S + ut1_days % 1.0) % 1.0
