@@ -78,8 +78,10 @@ def _is_ours(state: ControlState, status: Status, sky: Sky, now_tai_s: float, co
     """Whether what autotrack holds can be this pass: late enough, and where it was found so, near the path."""
     if sky.plan is None or now_tai_s < sky.plan.rise_tai_s - ACQUIRE_LEAD_S:
         return False
+    if state.track not in (TrackState.IDLE, TrackState.PREPOSITION):
+        return True
     target = path_point(sky, now_tai_s)
-    if state.track not in (TrackState.IDLE, TrackState.PREPOSITION) or target is None:
+    if target is None:
         return True
     east_deg_s = target.az_rate_deg_s * cos(radians(target.el_deg))
     searched_deg = config.search_along_s * hypot(east_deg_s, target.el_rate_deg_s) + config.search_across_deg

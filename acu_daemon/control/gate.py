@@ -5,6 +5,7 @@ are clamped to what the axis can do; registers it does not follow hold the true 
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import copysign, cos, isfinite, radians
 
 from acu_daemon.control.state import ControlConfig, ControlState
@@ -138,6 +139,7 @@ def _short_deg(half_beam_deg: float, acceleration_deg_s2: float) -> float:
     return max(half_beam_deg - entry_deg_s**2 / 2.0 / acceleration_deg_s2, 0.0)
 
 
+@lru_cache(maxsize=16)
 def _share(limits: AxisLimits, rate: float, acceleration: float) -> AxisLimits:
     return replace(
         limits,

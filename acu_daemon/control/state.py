@@ -153,9 +153,9 @@ class Exchange:
     reply: Reply | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Observation:
-    """What the last tick brought."""
+    """What the last tick brought.  Copied by `changed`."""
 
     reading: Reading | None = None  # with the status it came from; None: no good reply to the last write or poll
     status: Status | None = None

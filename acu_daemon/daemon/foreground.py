@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import structlog
 
 from acu_daemon.assist.gate import Dwell
 from acu_daemon.control.causes import LINK_SILENCE_S, is_acquired
+from acu_daemon.control.changed import changed
 from acu_daemon.control.doubt import Doubt
 from acu_daemon.control.state import ControlConfig, Event, Exchange, Observation, Request, Stage, Watchdog
 from acu_daemon.control.states import AUTOTRACKING
@@ -135,7 +135,7 @@ class Foreground:
         if first is not None and isinstance(first.reply, Status):
             self._take_status(first, first.reply, Poll())
         requests, self._requests = self._requests, ()
-        seen = replace(
+        seen = changed(
             self._seen,
             silence_s=self._silence_s(),
             must_poll=port.must_poll,
@@ -177,10 +177,10 @@ class Foreground:
             self._take_status(answer, answer.reply, command)
         elif isinstance(command, WriteAndPoll | Poll):
             if isinstance(answer.reply, Nak):
-                self._seen = replace(self._seen, refused=answer.reply)
+                self._seen = changed(self._seen, refused=answer.reply)
                 await self._poll_after_nak(command)
         else:
-            self._seen = replace(self._seen, extra=Exchange(command, answer.reply))
+            self._seen = changed(self._seen, extra=Exchange(command, answer.reply))
             self._report_extra(command, answer)
             if isinstance(answer.reply, Nak):
                 await self._poll_after_nak(command)
@@ -205,7 +205,7 @@ class Foreground:
             self._report_doubt(status)
             return
         reading = Reading(sample_tai_s, status.az_deg, status.el_deg, is_acquired(status), status.agc_db)
-        self._seen = replace(self._seen, status=status, reading=reading, is_confirmed=self._doubt.is_confirmed)
+        self._seen = changed(self._seen, status=status, reading=reading, is_confirmed=self._doubt.is_confirmed)
         is_fittable = self._area.state.track in AUTOTRACKING and not self._area.state.encoders.problem
         if self._dwell.is_locked(reading) and is_fittable:
             self._area.to_fit.append(reading)

@@ -103,6 +103,8 @@ class AcuPort:
                             data, arrival_s = await self._link.read()
                             first_byte_s = arrival_s if first_byte_s is None else first_byte_s
                             reply = self._exchange.receive(data)
+                if reply is not None:
+                    break
         except LinkError as error:
             self.problem = str(error)
             self._drop(str(error))

@@ -111,7 +111,7 @@ class RunStateKeeper:
         log: Any = structlog.get_logger("run_state")
         try:
             kept = None if fit is None else self._resume_of(fit)
-            text = json.dumps(_to_json(replace(state, fit=kept or state.fit)), indent=1, allow_nan=False)
+            text = json.dumps(_to_json(replace(state, fit=kept or state.fit)), allow_nan=False)
             replace_file(self._path, text.encode("ascii"))
         except (OSError, ValueError, OrbitError) as error:
             reason = reason_of(error) if isinstance(error, OSError) else str(error)
