@@ -13,9 +13,7 @@ LIMIT_SHARE = 0.3  # of the drive's acceleration: beyond it autotrack lags
 HALF_STEP_S = 0.25  # of the difference of rates that gives a path's acceleration
 
 
-def is_calm(
-    source: Propagator, site: Site, fit: FitResult | None, tai_s: Array, settings: EstimatorSettings
-) -> Flags:
+def is_calm(source: Propagator, site: Site, fit: FitResult | None, tai_s: Array, settings: EstimatorSettings) -> Flags:
     """Say of each time (N,) whether the path leaves both axes calm; all do where nobody knows the drives.
 
     Raises:  OrbitError: the source has no answer for one of the times.

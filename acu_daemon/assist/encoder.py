@@ -13,7 +13,6 @@ from acu_daemon.assist.full_path import (
     moved_site,
     node_times,
     orbit_partials_itrs,
-    path_itrs,
     sec_el,
     site_of,
     sky_partials,
@@ -78,8 +77,7 @@ def sky_covariance(propagator: Propagator, tai_s: Array, site: Site, fit: FitRes
     x = states_of(fit.correction, fit.bias, fit.station_shift_enu_m)
     nodes = node_times(float(tai_s[0]), float(tai_s[-1]))
     here = site_of(site, x)
-    path = path_itrs(propagator, x, site, nodes)
-    partials = orbit_partials_itrs(propagator, x, site, nodes)
+    path, partials = orbit_partials_itrs(propagator, x, site, nodes)
     has_shift = bool(fit.covariance[STATION, STATION].any())
     h = sky_partials(path.at(tai_s), partials.at(tai_s), here, has_shift)
     moved = np.tensordot(fit.covariance, h, 1)

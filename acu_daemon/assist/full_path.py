@@ -71,22 +71,22 @@ def path_itrs(source: Propagator, x: Array, site: Site, node_tai_s: Array) -> Cu
     return Curve(node_tai_s, *itrs_from_teme(r_m, v_m_s, node_tai_s, site.orientation))
 
 
-def orbit_partials_itrs(source: Propagator, x: Array, site: Site, node_tai_s: Array) -> Curve:
-    """What a unit of each of the six corrections moves, (6, K, 3), by differences from x.
+def orbit_partials_itrs(source: Propagator, x: Array, site: Site, node_tai_s: Array) -> tuple[Curve, Curve]:
+    """The path of the states x, and what a unit of each of the six corrections moves, (6, K, 3), by differences.
 
     One-sided: the steps are so small that the curvature is a 1e-5th, which only the direction of a sweep sees.
     """
-    r0_m, v0_m_s = source.corrected(correction_of(x)).states_teme(node_tai_s)
-    r_m, v_m_s = np.empty((2, ORBIT_COUNT, node_tai_s.size, 3))
+    r_m, v_m_s = np.empty((2, ORBIT_COUNT + 1, node_tai_s.size, 3))
+    r_m[-1], v_m_s[-1] = source.corrected(correction_of(x)).states_teme(node_tai_s)
     for k, step in enumerate(STEPS):
         moved = x.copy()
         moved[k] += step
         r1_m, v1_m_s = source.corrected(correction_of(moved)).states_teme(node_tai_s)
-        r_m[k], v_m_s[k] = (r1_m - r0_m) / step, (v1_m_s - v0_m_s) / step
-    times = np.tile(node_tai_s, ORBIT_COUNT)
+        r_m[k], v_m_s[k] = (r1_m - r_m[-1]) / step, (v1_m_s - v_m_s[-1]) / step
+    times = np.tile(node_tai_s, ORBIT_COUNT + 1)
     turned = itrs_from_teme(r_m.reshape(-1, 3), v_m_s.reshape(-1, 3), times, site.orientation)  # linear in both
-    value, rate = (one.reshape(ORBIT_COUNT, -1, 3) for one in turned)
-    return Curve(node_tai_s, value, rate)
+    value, rate = (one.reshape(ORBIT_COUNT + 1, -1, 3) for one in turned)
+    return Curve(node_tai_s, value[-1], rate[-1]), Curve(node_tai_s, value[:-1], rate[:-1])
 
 
 def station_partials_enu(r_itrs_m: Array, site: Site) -> Array:

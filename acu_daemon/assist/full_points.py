@@ -72,7 +72,9 @@ def residuals(path: Curve, here: Site, x: Array, settings: EstimatorSettings, se
 def _noise_scale(sigmas_off: Array) -> Array:
     """By how much the noise seen differs from the configured one, (2,): what few readings say counts little."""
     count = sigmas_off.shape[0]
-    seen = (_SIGMA_PER_MEDIAN * np.median(np.abs(sigmas_off), axis=0)) ** 2
+    middle = [(count - 1) // 2, count // 2]
+    median = np.partition(np.abs(sigmas_off), middle, axis=0)[middle].mean(axis=0)  # np.median takes 4 times as long
+    seen = (_SIGMA_PER_MEDIAN * median) ** 2
     scale: Array = np.sqrt((_NOISE_WORTH_COUNT + count * seen) / (_NOISE_WORTH_COUNT + count))
     return scale
 

@@ -44,7 +44,7 @@ class Partials:
     """Partials of the orbit's states, and how far the path has moved on the sky since.  Mutable; one owner."""
 
     def __init__(self, problem: Problem, x: Array, node_tai_s: Array) -> None:
-        self.curve = orbit_partials_itrs(problem.source, x, problem.site, node_tai_s)
+        _, self.curve = orbit_partials_itrs(problem.source, x, problem.site, node_tai_s)
         self.moved_rad = 0.0
 
 

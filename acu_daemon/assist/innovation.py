@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from acu_daemon.assist.full_path import node_times, orbit_partials_itrs, path_itrs, site_of, sky_partials
+from acu_daemon.assist.full_path import node_times, orbit_partials_itrs, site_of, sky_partials
 from acu_daemon.assist.full_points import Sights, residuals
 from acu_daemon.assist.full_states import STATION, Prior
 from acu_daemon.assist.settings import EstimatorSettings
@@ -45,12 +45,11 @@ class Denial:
         """How far each reading is from the prior's direction, in sigmas of both together, (N,)."""
         prior = self._prior
         nodes, here = node_times(float(seen.tai_s[0]), float(seen.tai_s[-1])), site_of(self._site, prior.mean)
-        path = path_itrs(self._source, prior.mean, self._site, nodes)
+        path, partials = orbit_partials_itrs(self._source, prior.mean, self._site, nodes)
         left = residuals(path, here, prior.mean, self._settings, seen)
         noise = np.square(left.noise_rad / left.noise_scale)
-        partials = orbit_partials_itrs(self._source, prior.mean, self._site, nodes).at(seen.tai_s)
         has_shift = bool(prior.covariance[STATION, STATION].any())
-        h = sky_partials(path.at(seen.tai_s), partials, here, has_shift)
+        h = sky_partials(path.at(seen.tai_s), partials.at(seen.tai_s), here, has_shift)
         moved = np.tensordot(prior.covariance, h, 1)
         across = np.sum(h[..., 0] * moved[..., 0], axis=0) + noise[:, 0]
         both = np.sum(h[..., 0] * moved[..., 1], axis=0)

@@ -10,6 +10,7 @@ axis that hunts, are left out.
 
 from collections import Counter
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -198,8 +199,8 @@ class TrackGate:
         """Whether the readings, with those before them, wander about the path; a fit to few cannot tell."""
         if len(asked) == 0:
             return False
-        recent = self._wander.asked(asked)
-        return seconds(self.kept) >= YOUNG_S and self._wander.denies(self.kept, self._offsets(recent, fit))
+        self._wander.take(asked)
+        return seconds(self.kept) >= YOUNG_S and self._wander.denies(self.kept, partial(self._offsets, fit=fit))
 
     def _leave_wanderers(self, off: Readings, fit: FitResult) -> Taken:
         """Leave out what was kept of the window that wanders; go on with the readings farther off."""

@@ -4,6 +4,7 @@ White noise of any size averages out; what comes back after a few readings does 
 the measure is the mean product of offsets a few readings apart, against that of the readings believed.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -48,35 +49,35 @@ class Wander:
         within: Flags = seen.angle_deg <= (REACH if self.reason else 1.0) * seen.near_deg
         return within
 
-    def asked(self, readings: Readings) -> Readings:
-        """Take the next readings; give them with those before them: what `denies` asks about."""
+    def take(self, readings: Readings) -> None:
+        """Take the next readings that `denies` asks about."""
         recent = Readings.joined([self._recent, readings])
         count = max(WINDOW_COUNT, int(np.count_nonzero(recent.tai_s > recent.tai_s[-1] - TURNING_S)), len(readings))
         self._recent = recent.part(slice(-count, None))
-        return self._recent
 
-    def denies(self, kept: Readings, seen: Offsets) -> bool:
-        """Say whether the newest readings wander.  seen: offsets of those asked about from the fit to the kept ones.
+    def denies(self, kept: Readings, offsets_of: Callable[[Readings], Offsets]) -> bool:
+        """Say whether the newest readings wander.  offsets_of: from the fit to the kept ones.
 
         Where they wander about the path as it was extrapolated, the orbit through them and those kept decides.
         """
-        newest_s = seen.tai_s[-1] - WINDOW_S
-        newest = seen.part(slice(-max(WINDOW_COUNT, int(np.count_nonzero(seen.tai_s > newest_s))), None))
-        self.reason = self._reason(kept, seen, newest)
+        tai_s = self._recent.tai_s
+        newest_count = max(WINDOW_COUNT, int(np.count_nonzero(tai_s > tai_s[-1] - WINDOW_S)))
+        newest = offsets_of(self._recent.part(slice(-newest_count, None)))
+        self.reason = self._reason(kept, newest, offsets_of)
         if not self.reason:
             self._since_tai_s = None
             return False
         if self._since_tai_s is None:
             self._since_tai_s = self.begin_tai_s = self._begin_tai_s(newest)
-        return float(seen.tai_s[-1]) < self._since_tai_s + LONGEST_S
+        return float(tai_s[-1]) < self._since_tai_s + LONGEST_S
 
     def _noise_deg2(self) -> float:
         return self._settings.sigma_azimuth_deg**2 + self._settings.sigma_elevation_deg**2
 
-    def _reason(self, kept: Readings, seen: Offsets, newest: Offsets) -> str:
+    def _reason(self, kept: Readings, newest: Offsets, offsets_of: Callable[[Readings], Offsets]) -> str:
         if newest.tai_s.size < WINDOW_COUNT or wander_deg2(newest) <= FACTOR * self._noise_deg2():
             return ""
-        count = int(np.count_nonzero(seen.tai_s >= self.begin_tai_s)) if self.reason else 0
+        count = int(np.count_nonzero(self._recent.tai_s >= self.begin_tai_s)) if self.reason else 0
         window = self._recent.part(slice(-max(count, newest.tai_s.size), None))
         before = kept.part((kept.tai_s < window.tai_s[0]) & (kept.tai_s > window.tai_s[0] - BEFORE_S))
         if len(before) < WINDOW_COUNT:
@@ -87,7 +88,7 @@ class Wander:
         old, new = together.part(slice(None, len(before))), together.part(slice(len(before), None))
         if wander_deg2(new) <= FACTOR * max(self._noise_deg2(), _noise_seen_deg2(old), wander_deg2(old)):
             return ""
-        whole = seen.part(slice(-len(window), None))
+        whole = offsets_of(window)
         return ACCELERATION if wander_deg2(_turning(whole)) > TURNING_SHARE * wander_deg2(whole) else OFF_PATH
 
     def _begin_tai_s(self, seen: Offsets) -> float:
