@@ -24,7 +24,7 @@ from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import Array
 
 _MAX_SWEEPS = 15
-_CONVERGED_RAD = 5e-7  # on the sky; what is left then is a hundredth of that
+_CONVERGED_RAD = 1e-7  # on the sky
 _STALE_RAD = 3e-4  # partials from a path this far away only slow the sweeps down
 _FIRST_S = 60.0
 _DOUBTFUL_SHARE = 0.05  # of the weight lost to outliers: then the readings are solved from the prior too

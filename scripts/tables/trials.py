@@ -6,7 +6,7 @@ import numpy as np
 
 from acu_daemon.assist.encoder import encoder_look, sky_covariance
 from acu_daemon.assist.full import FullEstimator
-from acu_daemon.assist.full_path import node_times, orbit_partials_itrs, path_itrs, site_of, sky_partials
+from acu_daemon.assist.full_path import node_times, orbit_partials_itrs, site_of, sky_partials
 from acu_daemon.assist.full_states import states_of
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import FitResult, Readings, Site
@@ -90,7 +90,7 @@ def _worst_drawn_deg(source: Propagator, site: Site, fit: FitResult, tai_s: Arra
     draws = sigma[:, None] * (vectors @ (np.sqrt(np.maximum(values, 0.0))[:, None] * normal))
     x = states_of(fit.correction, fit.bias, fit.station_shift_enu_m)
     here, nodes = site_of(site, x), node_times(float(tai_s[0]), float(tai_s[-1]))
-    path, partials = path_itrs(source, x, site, nodes), orbit_partials_itrs(source, x, site, nodes)
+    path, partials = orbit_partials_itrs(source, x, site, nodes)
     h = sky_partials(path.at(tai_s), partials.at(tai_s), here, True)[is_state]
     moved = np.tensordot(draws.T, h, 1)
     worst: Array = np.hypot(moved[..., 0], moved[..., 1]).max(axis=1) / DEG
