@@ -42,7 +42,7 @@ class ModelChoice:
 def choose(before: ModelChoice, residuals_deg: dict[Model, float], noise_deg: float) -> ModelChoice:
     """Choose by what each model leaves of the newest locked readings; the new fit wins unless it is bad.
 
-    residuals_deg: of the models there are, such as `newest_residual_deg` gives.
+    residuals_deg: such as `newest_residual_deg` gives, of the models there are, or of a good new fit alone.
     """
     best = min(residuals_deg, key=lambda one: residuals_deg[one])
     if Model.NEW_FIT not in residuals_deg:

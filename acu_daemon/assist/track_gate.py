@@ -200,7 +200,8 @@ class TrackGate:
         if len(asked) == 0:
             return False
         self._wander.take(asked)
-        return seconds(self.kept) >= YOUNG_S and self._wander.denies(self.kept, partial(self._offsets, fit=fit))
+        path = replace(fit, covariance=None)  # its sigma is of no use here, and slow
+        return seconds(self.kept) >= YOUNG_S and self._wander.denies(self.kept, partial(self._offsets, fit=path))
 
     def _leave_wanderers(self, off: Readings, fit: FitResult) -> Taken:
         """Leave out what was kept of the window that wanders; go on with the readings farther off."""
