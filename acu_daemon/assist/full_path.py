@@ -109,8 +109,8 @@ def enu_m(r_itrs_m: Array, site: Site) -> Array:
 def sky_partials(r_itrs_m: Array, orbit_itrs: Array, site: Site, has_shift: bool) -> Array:
     """What a unit of each state moves on the sky: (13, N, 2), across the elevation and in elevation, rad.
 
-    r_itrs_m: (N, 3); orbit_itrs: (6, N, 3), the second of `orbit_partials_itrs`; site: moved by the states; has_shift: whether the
-    station's place is in question.
+    r_itrs_m: (N, 3); orbit_itrs: (6, N, 3), the second of `orbit_partials_itrs`; site: moved by the states; has_shift:
+    whether the station's place is in question.
     """
     enu = enu_m(r_itrs_m, site)
     range_m = np.linalg.norm(enu, axis=1)
