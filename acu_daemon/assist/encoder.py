@@ -4,7 +4,6 @@ Commands go through the same encoders as readings, so biases that a fit found be
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -44,10 +43,10 @@ def _biased(seen: Look, bias: AngleBias) -> Look:
     el = np.radians(seen.el_deg)
     sin_el, cos_el = np.sin(el), np.cos(el)
     cot, sec = cot_el(sin_el, cos_el), sec_el(cos_el)
-    return replace(
-        seen,
+    return Look(
         az_deg=(seen.az_deg + bias.az_deg + bias.az_sec_deg * sec) % 360.0 % 360.0,
         el_deg=seen.el_deg + bias.el_deg + bias.el_cot_deg * cot,
+        range_m=seen.range_m,
         az_rate_deg_s=seen.az_rate_deg_s + bias.az_sec_deg * DEG * sec * sec * sin_el * seen.el_rate_deg_s,
         el_rate_deg_s=seen.el_rate_deg_s * (1.0 - bias.el_cot_deg * DEG * (1.0 + cot * cot)),
     )
@@ -82,7 +81,7 @@ def sky_covariance(propagator: Propagator, tai_s: Array, site: Site, fit: FitRes
     h = sky_partials(path.at(tai_s), partials.at(tai_s), here, has_shift)
     moved = np.tensordot(fit.covariance, h, 1)
     return (
-        np.sum(h[..., 0] * moved[..., 0], axis=0),
-        np.sum(h[..., 0] * moved[..., 1], axis=0),
-        np.sum(h[..., 1] * moved[..., 1], axis=0),
+        np.sum(h[:, 0] * moved[:, 0], axis=0),
+        np.sum(h[:, 0] * moved[:, 1], axis=0),
+        np.sum(h[:, 1] * moved[:, 1], axis=0),
     )

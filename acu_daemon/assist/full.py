@@ -1,5 +1,7 @@
 """The `full` estimator: six orbit corrections, angle biases and the station's place, with their covariance.  Pure."""
 
+from dataclasses import fields
+
 import numpy as np
 
 from acu_daemon.assist.base import BaseEstimator
@@ -116,7 +118,7 @@ class FullEstimator(BaseEstimator):
 
     def _result(self, solution: Solution, at_tai_s: float) -> FitResult:
         left_out = int(np.count_nonzero(solution.left.weights == 0.0))
-        newest = solution.left.off_rad[-_NEWEST_COUNT:]
+        newest = solution.left.off_rad[:, -_NEWEST_COUNT:]
         correction = correction_of(solution.x)
         along_s, across_deg = shift_for_people(self._source, correction, at_tai_s, self._site)
         return FitResult(
@@ -125,7 +127,7 @@ class FullEstimator(BaseEstimator):
             at_tai_s=at_tai_s,
             reading_count=self.used_count - left_out,
             rejected_count=len(self.rejected) + left_out,
-            residual_rms_deg=float(np.sqrt(np.mean(np.sum(newest**2, axis=1)))) / DEG,
+            residual_rms_deg=float(np.sqrt(np.mean(np.sum(newest**2, axis=0)))) / DEG,
             along_s=along_s,
             across_deg=across_deg,
             bias=bias_of(solution.x),
@@ -137,7 +139,7 @@ class FullEstimator(BaseEstimator):
 def _joined(parts: list[Sights]) -> Sights:
     if len(parts) == 1:
         return parts[0]
-    return Sights(*(np.concatenate([getattr(one, name) for one in parts]) for name in ("tai_s", "across", "upward")))
+    return Sights(*(np.concatenate([getattr(one, item.name) for one in parts]) for item in fields(Sights)))
 
 
 def shift_for_people(source: Propagator, correction: Correction, tai_s: float, site: Site) -> tuple[float, float]:

@@ -25,27 +25,29 @@ def node_times(first_tai_s: float, last_tai_s: float) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """Vectors (M, 3) and their rates at nodes, interpolated by cubic Hermite polynomials."""
+    """Vectors and their rates at nodes, interpolated by cubic Hermite polynomials.
+
+    Components first, here and in all that is computed of every reading: numpy is slow along an axis of three.
+    """
 
     node_tai_s: Array
-    value: Array  # (..., K, 3)
-    rate: Array
+    cubics: Array  # (4, ..., 3, K - 1): coefficients between the nodes
+
+    @staticmethod
+    def through(node_tai_s: Array, value: Array, rate: Array) -> "Curve":
+        """Take values and rates at even nodes, (..., 3, K)."""
+        step = node_tai_s[1] - node_tai_s[0]
+        first, rise = value[..., :-1], value[..., 1:] - value[..., :-1]
+        start, end = step * rate[..., :-1], step * rate[..., 1:]
+        return Curve(node_tai_s, np.array((first, start, 3.0 * rise - 2.0 * start - end, start + end - 2.0 * rise)))
 
     def at(self, tai_s: Array) -> Array:
-        """Give (..., N, 3)."""
-        step = self.node_tai_s[1] - self.node_tai_s[0]
-        x = (tai_s - self.node_tai_s[0]) / step
+        """Give (..., 3, N)."""
+        x = (tai_s - self.node_tai_s[0]) / (self.node_tai_s[1] - self.node_tai_s[0])
         i = np.minimum(np.maximum(x.astype(np.int64), 0), self.node_tai_s.size - 2)  # np.clip takes 5 times as long
-        u = (x - i)[:, None]
-        v = 1.0 - u
-        first, second = self.value.take(i, axis=-2), self.value.take(i + 1, axis=-2)
-        first_rate, second_rate = self.rate.take(i, axis=-2), self.rate.take(i + 1, axis=-2)
-        values: Array = (
-            v * v * (1.0 + 2.0 * u) * first
-            + u * u * (1.0 + 2.0 * v) * second
-            + (u * v * v * step) * first_rate
-            - (u * u * v * step) * second_rate
-        )
+        u = x - i
+        a, b, c, d = self.cubics.take(i, axis=-1)
+        values: Array = a + u * (b + u * (c + u * d))
         return values
 
 
@@ -68,11 +70,12 @@ def moved_site(site: Site, shift_enu_m: tuple[float, float, float]) -> Site:
 def path_itrs(source: Propagator, x: Array, site: Site, node_tai_s: Array) -> Curve:
     """Earth-fixed positions of the source as corrected by the states x."""
     r_m, v_m_s = source.corrected(correction_of(x)).states_teme(node_tai_s)
-    return Curve(node_tai_s, *itrs_from_teme(r_m, v_m_s, node_tai_s, site.orientation))
+    r_itrs_m, v_itrs_m_s = itrs_from_teme(r_m, v_m_s, node_tai_s, site.orientation)
+    return Curve.through(node_tai_s, r_itrs_m.T, v_itrs_m_s.T)
 
 
 def orbit_partials_itrs(source: Propagator, x: Array, site: Site, node_tai_s: Array) -> tuple[Curve, Curve]:
-    """The path of the states x, and what a unit of each of the six corrections moves, (6, K, 3), by differences.
+    """The path of the states x, and what a unit of each of the six corrections moves, (6, 3, K), by differences.
 
     One-sided: the steps are so small that the curvature is a 1e-5th, which only the direction of a sweep sees.
     """
@@ -85,12 +88,13 @@ def orbit_partials_itrs(source: Propagator, x: Array, site: Site, node_tai_s: Ar
         r_m[k], v_m_s[k] = (r1_m - r_m[-1]) / step, (v1_m_s - v_m_s[-1]) / step
     times = np.tile(node_tai_s, ORBIT_COUNT + 1)
     turned = itrs_from_teme(r_m.reshape(-1, 3), v_m_s.reshape(-1, 3), times, site.orientation)  # linear in both
-    value, rate = (one.reshape(ORBIT_COUNT + 1, -1, 3) for one in turned)
-    return Curve(node_tai_s, value[-1], rate[-1]), Curve(node_tai_s, value[:-1], rate[:-1])
+    value, rate = (one.reshape(ORBIT_COUNT + 1, -1, 3).swapaxes(1, 2) for one in turned)
+    path = Curve.through(node_tai_s, value[-1], rate[-1])
+    return path, Curve.through(node_tai_s, value[:-1], rate[:-1])
 
 
 def station_partials_enu(r_itrs_m: Array, site: Site) -> Array:
-    """What a metre of each shift of the station moves in east, north and up, (3, N, 3)."""
+    """What a metre of each shift of the station moves in east, north and up, (3, 3, N)."""
     here = enu_m(r_itrs_m, site)
     moved = [enu_m(r_itrs_m, moved_site(site, shift)) for shift in _shifts()]
     return np.array([(there - here) / _SHIFT_M for there in moved])
@@ -101,35 +105,38 @@ def _shifts() -> list[tuple[float, float, float]]:
 
 
 def enu_m(r_itrs_m: Array, site: Site) -> Array:
-    """Earth-fixed positions (N, 3) as east, north, up of the station."""
-    enu: Array = (r_itrs_m - station_itrs_m(site.station)) @ enu_from_itrs(site.station).T
+    """Earth-fixed positions (3, N) as east, north, up of the station."""
+    axes = enu_from_itrs(site.station)
+    enu: Array = axes @ r_itrs_m - (axes @ station_itrs_m(site.station))[:, None]
     return enu
 
 
 def sky_partials(r_itrs_m: Array, orbit_itrs: Array, site: Site, has_shift: bool) -> Array:
-    """What a unit of each state moves on the sky: (13, N, 2), across the elevation and in elevation, rad.
+    """What a unit of each state moves on the sky: (13, 2, N), across the elevation and in elevation, rad.
 
-    r_itrs_m: (N, 3); orbit_itrs: (6, N, 3), the second of `orbit_partials_itrs`; site: moved by the states; has_shift:
+    r_itrs_m: (3, N); orbit_itrs: (6, 3, N), the second of `orbit_partials_itrs`; site: moved by the states; has_shift:
     whether the station's place is in question.
     """
-    enu = enu_m(r_itrs_m, site)
-    range_m = np.linalg.norm(enu, axis=1)
-    sin_el = enu[:, 2] / range_m
-    cos_el = np.maximum(np.hypot(enu[:, 0], enu[:, 1]) / range_m, 1e-9)
-    sin_az, cos_az = enu[:, 0] / (range_m * cos_el), enu[:, 1] / (range_m * cos_el)
-    zero = np.zeros_like(range_m)
-    across = np.stack((cos_az, -sin_az, zero), axis=1) / range_m[:, None]
-    upward = np.stack((-sin_az * sin_el, -cos_az * sin_el, cos_el), axis=1) / range_m[:, None]
-    out = np.zeros((STATE_COUNT, range_m.size, 2))
-    moved = orbit_itrs @ enu_from_itrs(site.station).T
-    out[:ORBIT_COUNT, :, 0], out[:ORBIT_COUNT, :, 1] = (moved * across).sum(-1), (moved * upward).sum(-1)
-    out[6, :, 0] = cos_el
-    out[7, :, 0] = 1.0
-    out[8, :, 1] = 1.0
-    out[9, :, 1] = cot_el(sin_el, cos_el)
+    east, north, up = enu_m(r_itrs_m, site)
+    flat2 = east * east + north * north
+    range_m = np.sqrt(flat2 + up * up)
+    sin_el, cos_el = up / range_m, np.maximum(np.sqrt(flat2) / range_m, 1e-9)
+    sin_az, cos_az = east / (range_m * cos_el), north / (range_m * cos_el)
+
+    def turned(enu: Array) -> Array:  # (M, 3, N)
+        across = cos_az * enu[:, 0] - sin_az * enu[:, 1]
+        upward = cos_el * enu[:, 2] - sin_el * (sin_az * enu[:, 0] + cos_az * enu[:, 1])
+        both: Array = np.stack((across, upward), axis=1) / range_m
+        return both
+
+    out = np.zeros((STATE_COUNT, 2, range_m.size))
+    out[:ORBIT_COUNT] = turned(enu_from_itrs(site.station) @ orbit_itrs)
+    out[6, 0] = cos_el
+    out[7, 0] = 1.0
+    out[8, 1] = 1.0
+    out[9, 1] = cot_el(sin_el, cos_el)
     if has_shift:
-        moved = station_partials_enu(r_itrs_m, site)
-        out[10:, :, 0], out[10:, :, 1] = (moved * across).sum(-1), (moved * upward).sum(-1)
+        out[10:] = turned(station_partials_enu(r_itrs_m, site))
     return out
 
 

@@ -23,26 +23,26 @@ _MOST_NOISE = 10.0  # times the configured one: beyond it the path is not found 
 
 @dataclass(frozen=True, slots=True)
 class Sights:
-    """Readings as unit vectors' tangents: across the elevation and in elevation, east-north-up, (N, 3)."""
+    """Readings, oldest first: their times, and sine and cosine of both angles; every array (N,)."""
 
     tai_s: Array
-    across: Array
-    upward: Array
+    sin_az: Array
+    cos_az: Array
+    sin_el: Array
+    cos_el: Array
 
 
 def sights(readings: Readings) -> Sights:
-    """Turn readings into tangents of the sky at the direction they show."""
+    """Take sines and cosines of readings, once for all sweeps."""
     az, el = np.radians(readings.az_deg), np.radians(readings.el_deg)
-    sin_az, cos_az, sin_el, cos_el = np.sin(az), np.cos(az), np.sin(el), np.cos(el)
-    across = np.stack((cos_az, -sin_az, np.zeros_like(az)), axis=1)
-    return Sights(readings.tai_s, across, np.stack((-sin_az * sin_el, -cos_az * sin_el, cos_el), axis=1))
+    return Sights(readings.tai_s, np.sin(az), np.cos(az), np.sin(el), np.cos(el))
 
 
 @dataclass(frozen=True, slots=True)
 class Residuals:
-    """Readings minus what the states give, across and in elevation, (N, 2), rad.
+    """Readings minus what the states give, across and in elevation, (2, N), rad.
 
-    noise_rad: 1 sigma, (N, 2), the configured one x noise_scale (2,), by how much the readings differ from it.
+    noise_rad: 1 sigma, (2, N), the configured one x noise_scale (2,), by how much the readings differ from it.
     weights: robust ones, (N,), by the noise seen.
     """
 
@@ -55,25 +55,26 @@ class Residuals:
 def residuals(path: Curve, here: Site, x: Array, settings: EstimatorSettings, seen: Sights) -> Residuals:
     """Compare readings with a path, the site and the biases of the states x."""
     enu = enu_m(path.at(seen.tai_s), here)
-    enu /= np.sqrt(np.einsum("ij,ij->i", enu, enu))[:, None]
-    sin_el, cos_el = enu[:, 2], np.hypot(enu[:, 0], enu[:, 1])
-    cot = cot_el(sin_el, cos_el)
+    east, north, up = enu / np.sqrt((enu * enu).sum(axis=0))
+    cos_el = np.sqrt(east * east + north * north)
+    cot = cot_el(up, cos_el)
     az, az_sec, el, el_cot = x[BIAS]
-    off = np.empty((seen.tai_s.size, 2))
-    off[:, 0] = -np.einsum("ij,ij->i", seen.across, enu) - az * cos_el - az_sec
-    off[:, 1] = -np.einsum("ij,ij->i", seen.upward, enu) - el - el_cot * cot
-    sigma = np.empty_like(off)
-    sigma[:, 0] = settings.sigma_azimuth_deg * DEG
-    sigma[:, 1] = (settings.sigma_elevation_deg + settings.sigma_elevation_cot_deg * cot) * DEG
-    scale = _noise_scale(off / sigma)
-    return Residuals(off, sigma * np.minimum(scale, _MOST_NOISE), scale, robust_weights(off / (sigma * scale)))
+    off, sigma = np.empty((2, 2, seen.tai_s.size))
+    off[0] = seen.sin_az * north - seen.cos_az * east - az * cos_el - az_sec
+    off[1] = seen.sin_el * (seen.sin_az * east + seen.cos_az * north) - seen.cos_el * up - el - el_cot * cot
+    sigma[0] = settings.sigma_azimuth_deg * DEG
+    sigma[1] = (settings.sigma_elevation_deg + settings.sigma_elevation_cot_deg * cot) * DEG
+    sigmas_off = off / sigma
+    scale = _noise_scale(sigmas_off)
+    noise = sigma * np.minimum(scale, _MOST_NOISE)[:, None]
+    return Residuals(off, noise, scale, robust_weights(sigmas_off / scale[:, None]))
 
 
 def _noise_scale(sigmas_off: Array) -> Array:
     """By how much the noise seen differs from the configured one, (2,): what few readings say counts little."""
-    count = sigmas_off.shape[0]
+    count = sigmas_off.shape[1]
     middle = [(count - 1) // 2, count // 2]
-    median = np.partition(np.abs(sigmas_off), middle, axis=0)[middle].mean(axis=0)  # np.median takes 4 times as long
+    median = np.partition(np.abs(sigmas_off), middle)[:, middle].mean(axis=1)  # np.median takes 4 times as long
     seen = (_SIGMA_PER_MEDIAN * median) ** 2
     scale: Array = np.sqrt((_NOISE_WORTH_COUNT + count * seen) / (_NOISE_WORTH_COUNT + count))
     return scale
@@ -81,16 +82,15 @@ def _noise_scale(sigmas_off: Array) -> Array:
 
 def robust_weights(sigmas_off: Array) -> Array:
     """Robust weights (N,): Huber's, falling to zero for what cannot be noise (Hampel)."""
-    chi = np.maximum(np.sqrt(np.sum(sigmas_off**2, axis=1)), 1e-9)
-    weights: Array = np.minimum(1.0, _HUBER / chi) * np.clip(
-        (_LAST_SIGMAS - chi) / (_LAST_SIGMAS - _FALL_FROM), 0.0, 1.0
-    )
+    chi = np.maximum(np.sqrt((sigmas_off * sigmas_off).sum(axis=0)), 1e-9)
+    falling = np.maximum((_LAST_SIGMAS - chi) / (_LAST_SIGMAS - _FALL_FROM), 0.0)
+    weights: Array = np.minimum(1.0, _HUBER / chi) * np.minimum(falling, 1.0)
     return weights
 
 
 @dataclass(frozen=True, slots=True)
 class Points:
-    """Normal points: time (K,), mean residual and its sigma (K, 2)."""
+    """Normal points: time (K,), mean residual and its sigma (2, K)."""
 
     tai_s: Array
     off: Array
@@ -108,5 +108,5 @@ def normal_points(tai_s: Array, seen: Residuals, starts: Indices) -> Points:
     total = np.add.reduceat(heavy, starts)
     since = tai_s - np.repeat(tai_s[starts], np.diff(starts, append=tai_s.size))
     at = tai_s[starts] + np.add.reduceat(heavy * since, starts) / total
-    mean = np.add.reduceat(heavy[:, None] * seen.off_rad, starts, axis=0) / total[:, None]
-    return Points(at, mean, np.sqrt(total)[:, None] / seen.noise_rad[starts])
+    mean = np.add.reduceat(heavy * seen.off_rad, starts, axis=1) / total
+    return Points(at, mean, np.sqrt(total) / seen.noise_rad[:, starts])

@@ -4,7 +4,7 @@ Each sweep takes the residuals of all readings against the path that the present
 points; partials only set the direction of the step.  So the result does not depend on how the readings arrived.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -76,7 +76,7 @@ def solve(problem: Problem, seen: Sights, before: Solution | None) -> Solution:
 
 def _first_of(seen: Sights) -> Sights:
     end = int(np.searchsorted(seen.tai_s, seen.tai_s[0] + _FIRST_S))
-    return Sights(seen.tai_s[:end], seen.across[:end], seen.upward[:end])
+    return Sights(*(getattr(seen, item.name)[:end] for item in fields(seen)))
 
 
 def _sweep(problem: Problem, seen: Sights, x: Array, partials: Partials | None) -> Solution:
@@ -84,14 +84,13 @@ def _sweep(problem: Problem, seen: Sights, x: Array, partials: Partials | None) 
     if partials is None or not np.array_equal(partials.curve.node_tai_s, nodes):
         partials = Partials(problem, x, nodes)
     starts = seconds_of(seen.tai_s)
-    root = _root(problem.prior.covariance)
     has_shift = bool(problem.prior.covariance[STATION, STATION].any())
     for _ in range(_MAX_SWEEPS):
         path, here = path_itrs(problem.source, x, problem.site, nodes), site_of(problem.site, x)
         left = residuals(path, here, x, problem.settings, seen)
         points = normal_points(seen.tai_s, left, starts)
         h = sky_partials(path.at(points.tai_s), partials.curve.at(points.tai_s), here, has_shift)
-        new, covariance = _step(problem.prior, root, x, h, points)
+        new, covariance = _step(problem.prior, x, h, points)
         step_rad = float(np.max(np.abs(np.tensordot(new - x, h, 1)), initial=0.0))
         x = new
         if step_rad < _CONVERGED_RAD:
@@ -102,18 +101,9 @@ def _sweep(problem: Problem, seen: Sights, x: Array, partials: Partials | None) 
     return Solution(x, covariance, left, partials)
 
 
-def _root(covariance: Array) -> Array:
-    """A root (13, M) of a covariance that may hold zeros: covariance = root root^T."""
-    sigma = np.sqrt(np.diag(covariance))
-    held = np.where(sigma > 0.0, sigma, 1.0)
-    values, vectors = np.linalg.eigh(covariance / np.outer(held, held))
-    root: Array = held[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-    root[sigma == 0.0] = 0.0
-    return root
-
-
-def _step(prior: Prior, root: Array, x: Array, h: Array, points: Points) -> tuple[Array, Array]:
+def _step(prior: Prior, x: Array, h: Array, points: Points) -> tuple[Array, Array]:
     """Solve the linear problem about x for z, states = mean + root z: the prior is then a unit matrix."""
+    root = prior.root
     rows = (h * points.per_sigma).reshape(h.shape[0], -1)
     target = (points.off * points.per_sigma).reshape(-1) + (x - prior.mean) @ rows
     whitened = root.T @ rows

@@ -7,6 +7,7 @@
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import hypot, radians
 
 import numpy as np
@@ -24,12 +25,22 @@ STEPS = (1e-5, 1e-5, 1e-10, 1e-5, 1e-5, 1e-5)  # for differences: some 70 m each
 _UP_SHARE = 0.1  # coordinates are rounded in latitude and longitude; heights are known much better
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Prior:
     """Mean (13,) and covariance (13, 13) of the states before the first reading."""
 
     mean: Array
     covariance: Array = field(repr=False)
+
+    @cached_property
+    def root(self) -> Array:
+        """A root (13, 13) of the covariance, which may hold zeros: covariance = root root^T."""
+        sigma = np.sqrt(np.diag(self.covariance))
+        held = np.where(sigma > 0.0, sigma, 1.0)
+        values, vectors = np.linalg.eigh(self.covariance / np.outer(held, held))
+        root: Array = held[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+        root[sigma == 0.0] = 0.0
+        return root
 
 
 def correction_of(x: Array) -> Correction:

@@ -81,7 +81,8 @@ class ReadingGate:
         elevation: AxisLimits | None,
     ) -> None:
         self._max_elevation_deg = max_elevation_deg
-        self._sigma_deg = (sigma_azimuth_deg, sigma_elevation_deg)
+        self._noise_az_deg = _SIGMA_COUNT * sqrt(2.0) * sigma_azimuth_deg
+        self._noise_el_deg = _SIGMA_COUNT * sqrt(2.0) * sigma_elevation_deg
         self._azimuth, self._elevation = azimuth, elevation
         self._last: tuple[float, float, float] | None = None
 
@@ -106,7 +107,6 @@ class ReadingGate:
             return False
         dt_s = tai_s - self._last[0]
         cos_el = max(cos(radians(max(el_deg, self._last[2]))), 1e-3)
-        noise_az, noise_el = (_SIGMA_COUNT * sqrt(2.0) * sigma_deg for sigma_deg in self._sigma_deg)
-        far_az = self._azimuth.max_rate_deg_s * _RATE_MARGIN * dt_s + noise_az / cos_el
-        far_el = self._elevation.max_rate_deg_s * _RATE_MARGIN * dt_s + noise_el
+        far_az = self._azimuth.max_rate_deg_s * _RATE_MARGIN * dt_s + self._noise_az_deg / cos_el
+        far_el = self._elevation.max_rate_deg_s * _RATE_MARGIN * dt_s + self._noise_el_deg
         return abs(wrap_180(az_deg - self._last[1])) > far_az or abs(el_deg - self._last[2]) > far_el

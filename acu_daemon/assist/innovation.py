@@ -47,13 +47,13 @@ class Denial:
         nodes, here = node_times(float(seen.tai_s[0]), float(seen.tai_s[-1])), site_of(self._site, prior.mean)
         path, partials = orbit_partials_itrs(self._source, prior.mean, self._site, nodes)
         left = residuals(path, here, prior.mean, self._settings, seen)
-        noise = np.square(left.noise_rad / left.noise_scale)
+        noise = np.square(left.noise_rad / left.noise_scale[:, None])
         has_shift = bool(prior.covariance[STATION, STATION].any())
         h = sky_partials(path.at(seen.tai_s), partials.at(seen.tai_s), here, has_shift)
         moved = np.tensordot(prior.covariance, h, 1)
-        across = np.sum(h[..., 0] * moved[..., 0], axis=0) + noise[:, 0]
-        both = np.sum(h[..., 0] * moved[..., 1], axis=0)
-        upward = np.sum(h[..., 1] * moved[..., 1], axis=0) + noise[:, 1]
-        x, y = left.off_rad.T
+        across = np.sum(h[:, 0] * moved[:, 0], axis=0) + noise[0]
+        both = np.sum(h[:, 0] * moved[:, 1], axis=0)
+        upward = np.sum(h[:, 1] * moved[:, 1], axis=0) + noise[1]
+        x, y = left.off_rad
         sigmas: Array = np.sqrt((x * x * upward - 2.0 * both * x * y + y * y * across) / (across * upward - both**2))
         return sigmas

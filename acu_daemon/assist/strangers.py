@@ -36,7 +36,8 @@ def level_db(readings: Readings, newest_s: float) -> float | None:
     if len(readings) == 0 or readings.agc_db is None:
         return None
     newest = readings.agc_db[readings.tai_s >= readings.tai_s[-1] - newest_s]
-    return None if bool(np.all(np.isnan(newest))) else float(np.nanmedian(newest))
+    known = newest[~np.isnan(newest)]
+    return float(np.median(known)) if known.size else None
 
 
 def rise_db(kept: Readings, off: Readings) -> float | None:

@@ -63,8 +63,8 @@ def evidence(problem: Problem, solution: Solution) -> float:
     (of_prior, _), (of_solution, _) = (_held(problem, one) for one in (problem.prior.covariance, solution.covariance))
     occam = float(np.linalg.slogdet(of_solution)[1] - np.linalg.slogdet(of_prior)[1])
     left = solution.left
-    misfit = float(np.sum(left.weights * np.sum(np.square(left.off_rad / left.noise_rad), axis=1)))
-    noise = 2.0 * left.off_rad.shape[0] * float(np.sum(np.log(left.noise_scale)))
+    misfit = float(np.sum(left.weights * np.sum(np.square(left.off_rad / left.noise_rad), axis=0)))
+    noise = 2.0 * left.off_rad.shape[1] * float(np.sum(np.log(left.noise_scale)))
     likely: float = (occam - misfit - noise - _strain(problem, solution)) / 2.0
     return likely
 

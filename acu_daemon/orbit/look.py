@@ -12,6 +12,7 @@ from acu_daemon.units import DEG, Array
 
 NODE_S, LEAST_NODES = 20.0, 8  # the orbit between: to 1 mm, as near as the times themselves are rounded
 WORTH_COUNT = 16  # times for a node: fewer are faster without
+_POINT_GAP = 1e-30  # at a point its own value outweighs all others
 _ZENITH_M2 = 1e-12  # keeps azimuth and its rate finite (0) exactly overhead, where neither exists
 
 
@@ -28,7 +29,7 @@ class Look:
 
 @lru_cache(maxsize=64)
 def _origin_and_axes(station: Station) -> tuple[Array, Array]:
-    return station_itrs_m(station), enu_from_itrs(station).T.copy()
+    return station_itrs_m(station), enu_from_itrs(station)
 
 
 def look(r_itrs_m: Array, v_itrs_m_s: Array, station: Station) -> Look:
@@ -37,8 +38,8 @@ def look(r_itrs_m: Array, v_itrs_m_s: Array, station: Station) -> Look:
     Source:  seed 000, eqs 1-3, turned to east-north-up; the rates are their time derivatives.
     """
     origin_m, axes = _origin_and_axes(station)
-    east, north, up = ((r_itrs_m - origin_m) @ axes).T
-    east_rate, north_rate, up_rate = (v_itrs_m_s @ axes).T
+    east, north, up = axes @ (r_itrs_m - origin_m).T  # rows that lie whole in memory
+    east_rate, north_rate, up_rate = axes @ v_itrs_m_s.T
     flat2 = np.maximum(east * east + north * north, _ZENITH_M2)
     flat = np.sqrt(flat2)
     range2 = flat2 + up * up
@@ -85,9 +86,6 @@ def _interpolation(x: Array, points: Array) -> Array:
     weights = np.where(np.arange(points.size) % 2, -1.0, 1.0)
     weights[[0, -1]] /= 2.0
     gap = x[:, None] - points
-    is_point = gap == 0.0
-    terms = weights / np.where(is_point, 1.0, gap)
+    terms = weights / np.where(gap == 0.0, _POINT_GAP, gap)
     shares: Array = terms / terms.sum(axis=1, keepdims=True)
-    is_exact = is_point.any(axis=1)
-    shares[is_exact] = is_point[is_exact]
     return shares

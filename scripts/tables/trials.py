@@ -93,5 +93,5 @@ def _worst_drawn_deg(source: Propagator, site: Site, fit: FitResult, tai_s: Arra
     path, partials = orbit_partials_itrs(source, x, site, nodes)
     h = sky_partials(path.at(tai_s), partials.at(tai_s), here, True)[is_state]
     moved = np.tensordot(draws.T, h, 1)
-    worst: Array = np.hypot(moved[..., 0], moved[..., 1]).max(axis=1) / DEG
+    worst: Array = np.hypot(moved[:, 0], moved[:, 1]).max(axis=1) / DEG
     return worst
