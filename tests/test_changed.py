@@ -5,15 +5,19 @@ from typing import Any
 
 import pytest
 
+from acu_daemon.control.axis_watch import AxisWatch
 from acu_daemon.control.changed import changed
-from acu_daemon.control.state import ControlState
+from acu_daemon.control.state import ControlState, Observation
+
+MEMORIES = (ControlState(az_deg=12.0, latch="azimuth"), Observation(silence_s=0.3), AxisWatch(side=1))
 
 
-@pytest.mark.parametrize("name", [item.name for item in fields(ControlState)])
-def test_every_field_can_be_changed_as_replace_does_and_the_old_memory_stays(name: str) -> None:
-    before = replace(ControlState(), az_deg=12.0, latch="azimuth")
-    value: dict[str, Any] = {name: object()}
-    after = changed(before, **value)
-    assert after == replace(before, **value) != before
-    assert before == replace(ControlState(), az_deg=12.0, latch="azimuth")
-    assert hash(after) == hash(replace(before, **value))
+@pytest.mark.parametrize("before", MEMORIES, ids=lambda one: type(one).__name__)
+def test_every_field_can_be_changed_as_replace_does_and_the_old_memory_stays(before: Any) -> None:
+    kept = replace(before)
+    for item in fields(before):
+        value: dict[str, Any] = {item.name: object()}
+        after = changed(before, **value)
+        assert after == replace(before, **value) != before, item.name
+        assert hash(after) == hash(replace(before, **value)), item.name
+    assert before == kept
