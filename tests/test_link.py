@@ -151,6 +151,18 @@ async def test_of_a_line_that_babbles_only_the_newest_bytes_wait() -> None:
     assert newest[-1] == (b"y", 2.0 * MAX_WAITING_BYTES - 1.0)
 
 
+async def test_a_wait_ends_at_its_deadline_but_what_has_come_is_taken_even_after_it() -> None:
+    arrivals, loop = Arrivals(), asyncio.get_running_loop()
+    until_s = loop.time() + 0.02
+    with pytest.raises(TimeoutError):
+        await arrivals.get(until_s)
+    assert loop.time() >= until_s
+    arrivals.put(b"late", 1.0)
+    assert await arrivals.get(until_s) == (b"late", 1.0)
+    loop.call_soon(arrivals.put, b"next", 2.0)
+    assert await arrivals.get() == (b"next", 2.0)
+
+
 async def test_a_closed_link_says_so_and_closing_twice_is_harmless() -> None:
     for link in (make_link("tcp://127.0.0.1:1"), make_link("serial:///dev/null")):
         with pytest.raises(LinkError, match="not open"):

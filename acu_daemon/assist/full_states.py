@@ -34,12 +34,13 @@ class Prior:
 
     @cached_property
     def root(self) -> Array:
-        """A root (13, 13) of the covariance, which may hold zeros: covariance = root root^T."""
-        sigma = np.sqrt(np.diag(self.covariance))
-        held = np.where(sigma > 0.0, sigma, 1.0)
-        values, vectors = np.linalg.eigh(self.covariance / np.outer(held, held))
-        root: Array = held[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-        root[sigma == 0.0] = 0.0
+        """A root (13, M) of the covariance: covariance = root root^T, with M states that have a variance."""
+        variance = np.diag(self.covariance)
+        is_open = variance > 0.0
+        sigma = np.sqrt(variance[is_open])
+        values, vectors = np.linalg.eigh(self.covariance[np.ix_(is_open, is_open)] / np.outer(sigma, sigma))
+        root = np.zeros((variance.size, sigma.size))
+        root[is_open] = sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
         return root
 
 

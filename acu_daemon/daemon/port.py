@@ -96,15 +96,12 @@ class AcuPort:
             frame = self._exchange.begin(command)
             wire_s = (len(frame) + reply_bytes(command)) * self._link.byte_time_s
             self._link.write(frame)
-            for patience_s in (EXCHANGE_DEADLINE_S, 0.0):  # a loop that came late finds reply and deadline side by side
-                with contextlib.suppress(TimeoutError):
-                    async with asyncio.timeout(patience_s):
-                        while reply is None:
-                            data, arrival_s = await self._link.read()
-                            first_byte_s = arrival_s if first_byte_s is None else first_byte_s
-                            reply = self._exchange.receive(data)
-                if reply is not None:
-                    break
+            until_s = asyncio.get_running_loop().time() + EXCHANGE_DEADLINE_S
+            with contextlib.suppress(TimeoutError):
+                while reply is None:
+                    data, arrival_s = await self._link.read(until_s)
+                    first_byte_s = arrival_s if first_byte_s is None else first_byte_s
+                    reply = self._exchange.receive(data)
         except LinkError as error:
             self.problem = str(error)
             self._drop(str(error))

@@ -1,6 +1,7 @@
 """What has arrived on a link and waits for its reader, with the time of its arrival."""
 
 import asyncio
+import math
 from collections import deque
 
 from acu_daemon.errors import LinkError
@@ -34,13 +35,24 @@ class Arrivals:
             self._error = error
             self._something_came.set()
 
-    async def get(self) -> tuple[bytes, float]:
-        """Wait for the next chunk.  LinkError: the line is dead."""
+    async def get(self, until_s: float = math.inf) -> tuple[bytes, float]:
+        """Wait for the next chunk.  LinkError: the line is dead.  TimeoutError: none has come until then, loop time.
+
+        A loop that comes late finds a chunk and the deadline side by side, and takes the chunk.
+        """
+        loop = asyncio.get_running_loop()
         while not self._chunks:
             if self._error is not None:
                 raise type(self._error)(str(self._error))
+            if loop.time() >= until_s:
+                raise TimeoutError
             self._something_came.clear()
-            await self._something_came.wait()
+            timer = loop.call_at(until_s, self._something_came.set) if until_s < math.inf else None
+            try:
+                await self._something_came.wait()
+            finally:
+                if timer is not None:
+                    timer.cancel()
         return self._take()
 
     def clear(self) -> None:

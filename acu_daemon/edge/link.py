@@ -1,5 +1,6 @@
 """The seam between the daemon and the ACU's bytes, and the choice of the link by its URL (ICD section 1)."""
 
+import math
 import time
 from collections.abc import Callable
 from typing import Protocol
@@ -35,8 +36,11 @@ class Link(Protocol):
     def write(self, data: bytes) -> None:
         """Send.  LinkError: the link is not open."""
 
-    async def read(self) -> tuple[bytes, float]:
-        """Wait for the next chunk and its arrival time on the monotonic clock.  LinkError: the link is dead."""
+    async def read(self, until_s: float = math.inf) -> tuple[bytes, float]:
+        """Wait for the next chunk and its arrival time on the monotonic clock.
+
+        LinkError: the link is dead.  TimeoutError: nothing has come until then, on the loop's clock.
+        """
         ...
 
     def drain_input(self) -> None:

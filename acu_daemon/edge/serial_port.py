@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import errno
+import math
 import os
 import termios
 from collections.abc import Callable
@@ -86,10 +87,13 @@ class SerialLink:
         else:
             loop.remove_writer(port.fileno())
 
-    async def read(self) -> tuple[bytes, float]:
-        """Wait for the next bytes and their arrival time.  LinkError: the line hung up."""
+    async def read(self, until_s: float = math.inf) -> tuple[bytes, float]:
+        """Wait for the next bytes and their arrival time.
+
+        LinkError: the line hung up.  TimeoutError: nothing has come until then, on the loop's clock.
+        """
         self._opened()
-        return await self._arrivals.get()
+        return await self._arrivals.get(until_s)
 
     def drain_input(self) -> None:
         """Throw away what has arrived and was not read."""

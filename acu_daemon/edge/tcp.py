@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import math
 import socket
 import struct
 from collections.abc import Callable
@@ -60,9 +61,12 @@ class TcpLink:
         """Send; never waits.  LinkError: not connected."""
         self._connected().write(data)
 
-    async def read(self) -> tuple[bytes, float]:
-        """Wait for the next bytes and their arrival time.  LinkError: the other side closed."""
-        return await self._connected().arrivals.get()
+    async def read(self, until_s: float = math.inf) -> tuple[bytes, float]:
+        """Wait for the next bytes and their arrival time.
+
+        LinkError: the other side closed.  TimeoutError: nothing has come until then, on the loop's clock.
+        """
+        return await self._connected().arrivals.get(until_s)
 
     def drain_input(self) -> None:
         """Throw away what has arrived and was not read."""

@@ -1,6 +1,7 @@
 """SIMULATION: a link to a fake ACU in memory, with the wire's times and faults, for virtual time."""
 
 import asyncio
+import math
 
 from acu_daemon.edge.arrivals import Arrivals
 from acu_daemon.edge.clock import Clock
@@ -93,10 +94,13 @@ class MemoryLink:
         if not self.is_cut and not self._is_dead:
             self._arrivals.put(piece, self._clock.monotonic_s())
 
-    async def read(self) -> tuple[bytes, float]:
-        """Wait for the next bytes and their arrival time.  LinkError: the far side closed."""
+    async def read(self, until_s: float = math.inf) -> tuple[bytes, float]:
+        """Wait for the next bytes and their arrival time.
+
+        LinkError: the far side closed.  TimeoutError: nothing has come until then, on the loop's clock.
+        """
         self._opened()
-        return await self._arrivals.get()
+        return await self._arrivals.get(until_s)
 
     def drain_input(self) -> None:
         """Throw away what has arrived and was not read."""
