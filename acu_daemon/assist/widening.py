@@ -27,7 +27,9 @@ class Width:
     factor: float = 1.0
 
     def of(self, problem: Problem) -> Problem:
-        """The problem with an orbit that is worth less."""
+        """The problem with an orbit that is worth less; itself where it is not, with what it has computed."""
+        if self == WIDTHS[0]:
+            return problem
         covariance = problem.prior.covariance.copy()
         covariance[ORBIT] *= self.factor
         covariance[:, ORBIT] *= self.factor
