@@ -10,10 +10,11 @@ from conftest import needs_data
 from made_orbits import EPOCH_TAI_S, circular, site, visible
 from real_passes import noisy, sky_angles_deg
 
+from acu_daemon.assist import encoder
 from acu_daemon.assist.encoder import encoder_look, sigma_deg, sky_covariance
 from acu_daemon.assist.full import FullEstimator, shift_for_people
 from acu_daemon.assist.full_path import moved_site, node_times, orbit_partials_itrs, path_itrs, sky_partials
-from acu_daemon.assist.full_states import STATE_COUNT, STEPS, correction_of, make_prior
+from acu_daemon.assist.full_states import STATE_COUNT, STEPS, correction_of, make_prior, states_of
 from acu_daemon.assist.gate import ABOVE_MAX_ELEVATION
 from acu_daemon.assist.prediction import predict
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings, StateSigmas
@@ -335,6 +336,22 @@ def test_errors_lie_inside_the_ellipses_as_often_as_they_should():
     assert len(inside) > 30
     assert one_sigma == pytest.approx(0.39, abs=0.15)  # of some 40 passes; a pass counts about once
     assert two_sigma == pytest.approx(0.86, abs=0.12)
+
+
+def test_a_sigma_from_partials_remembered_of_a_path_nearby_is_that_of_the_path(monkeypatch):
+    source, where = circular(66.0, 0.001), site(4.0)
+    tai_s = visible(source, where, 1.0)
+    fit = _fit(source, where, Readings(tai_s[:200], *(one[:200] for one in _shown(source, where, tai_s))))
+    corrections = [
+        Correction(*(states_of(fit.correction, fit.bias, (0.0, 0.0, 0.0))[:6] + k * np.array(STEPS)))
+        for k in (-4.0, 0.0, 1.5, 4.0)
+    ]
+    fits = [replace(fit, correction=correction) for correction in corrections]
+    seen = [sigma_deg(source.corrected(one.correction), tai_s, where, one) for one in fits]
+    monkeypatch.setattr(encoder, "_NEAR_STEPS", 1e-6 * np.array(STEPS))
+    exact = [sigma_deg(source.corrected(one.correction), tai_s, where, one) for one in fits]
+    assert np.allclose(seen, exact, rtol=0.01, atol=0.0)
+    assert not np.array_equal(seen, exact)  # the two ways differ
 
 
 def test_sigma_grows_into_the_future_and_shrinks_with_readings():

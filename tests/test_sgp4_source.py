@@ -110,6 +110,9 @@ def test_a_corrected_propagator_survives_pickling() -> None:
     propagator = Sgp4Propagator(vallado_sets()[2]).corrected(Correction(0.01, -0.02))
     at = propagator.epoch_tai_s + np.arange(100) * 10.0
     copy = pickle.loads(pickle.dumps(propagator))
+    assert copy == propagator != propagator.corrected(Correction(delta_raan_rad=1e-9))
+    assert hash(copy) == hash(propagator)
+    assert propagator != propagator.elements
     assert np.array_equal(copy.states_teme(at), propagator.states_teme(at))
     assert (copy.kind, copy.epoch_tai_s) == ("tle", propagator.epoch_tai_s)
 

@@ -4,10 +4,12 @@ Commands go through the same encoders as readings, so biases that a fit found be
 """
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 
 from acu_daemon.assist.full_path import (
+    Curve,
     cot_el,
     moved_site,
     node_times,
@@ -16,13 +18,14 @@ from acu_daemon.assist.full_path import (
     site_of,
     sky_partials,
 )
-from acu_daemon.assist.full_states import STATION, states_of
-from acu_daemon.model import AngleBias, FitResult, Site
+from acu_daemon.assist.full_states import ORBIT, STATE_COUNT, STATION, STEPS, states_of
+from acu_daemon.model import AngleBias, Correction, FitResult, Site
 from acu_daemon.orbit.look import Look, look_at
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import DEG, Array
 
 _SIGMA_STEP_S = 5.0
+_NEAR_STEPS = 10.0 * np.array(STEPS)  # a path half a kilometre aside: a sigma differs by a few 1000ths
 
 
 def encoder_look(
@@ -66,6 +69,16 @@ def sigma_deg(propagator: Propagator, tai_s: Array, site: Site, fit: FitResult |
     return sigma
 
 
+@lru_cache(maxsize=16)
+def _partials_near(
+    source: Propagator, orbit: tuple[float, ...], site: Site, node_tai_s: tuple[float, ...]
+) -> tuple[Curve, Curve]:
+    """`orbit_partials_itrs` of orbit states near a fit's, remembered: the next fits are near them too."""
+    x = np.zeros(STATE_COUNT)
+    x[ORBIT] = orbit
+    return orbit_partials_itrs(source, x, site, np.array(node_tai_s))
+
+
 def sky_covariance(propagator: Propagator, tai_s: Array, site: Site, fit: FitResult) -> tuple[Array, Array, Array]:
     """Covariance of predicted directions, (N,) each, rad^2: across the elevation, both together, in elevation.
 
@@ -76,7 +89,8 @@ def sky_covariance(propagator: Propagator, tai_s: Array, site: Site, fit: FitRes
     x = states_of(fit.correction, fit.bias, fit.station_shift_enu_m)
     nodes = node_times(float(tai_s[0]), float(tai_s[-1]))
     here = site_of(site, x)
-    path, partials = orbit_partials_itrs(propagator, x, site, nodes)
+    near = tuple((np.round(x[ORBIT] / _NEAR_STEPS) * _NEAR_STEPS).tolist())
+    path, partials = _partials_near(propagator.corrected(Correction(*near)), near, site, tuple(nodes.tolist()))
     has_shift = bool(fit.covariance[STATION, STATION].any())
     h = sky_partials(path.at(tai_s), partials.at(tai_s), here, has_shift)
     moved = np.tensordot(fit.covariance, h, 1)

@@ -10,6 +10,9 @@ from acu_daemon.units import Array
 class Propagator(Protocol):
     """A satellite's motion.  Immutable and picklable (it is sent to the process that fits)."""
 
+    def __hash__(self) -> int:
+        """Equal sources share what is remembered of them."""
+
     @property
     def kind(self) -> str:
         """The source: "brouwer", "tle", "omm" and so on."""

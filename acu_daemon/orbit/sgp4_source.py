@@ -22,7 +22,7 @@ class Sgp4Propagator:
     """A satellite's motion by SGP4, the correction added to the mean elements before SGP4 is set up.
 
     Times enter as the seconds elapsed since the epoch, so a leap second in between moves nothing.
-    Immutable; pickled as the elements and the correction.
+    Immutable; compared and pickled as the elements and the correction.
     """
 
     def __init__(self, elements: ElementSet, correction: Correction | None = None) -> None:
@@ -54,6 +54,14 @@ class Sgp4Propagator:
     def corrected(self, correction: Correction) -> "Sgp4Propagator":
         """The same elements with this correction in place of any earlier one."""
         return Sgp4Propagator(self.elements, correction)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Sgp4Propagator):
+            return NotImplemented
+        return (self.elements, self.correction) == (other.elements, other.correction)
+
+    def __hash__(self) -> int:
+        return hash((self.elements, self.correction))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Sgp4Propagator, (self.elements, self.correction)
