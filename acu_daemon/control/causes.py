@@ -11,6 +11,7 @@ LINK_SILENCE_S = 0.5  # ICD section 1
 ACQUIRE_LEAD_S = 20.0  # autotrack may be selected this long before the rise
 ON_POINT_BEAMS = 0.25
 RESUME_DEG = 5.0  # an antenna this near to the path goes on from an interruption without a new approach
+BEFORE = frozenset({TrackState.IDLE, TrackState.PREPOSITION})  # only there it matters where the antenna stands
 MODE_SETTLE_S = 3.0  # a MODE SELECT takes a moment to show; only later is a left mode the ACU's own doing
 
 
@@ -78,7 +79,7 @@ def _is_ours(state: ControlState, status: Status, sky: Sky, now_tai_s: float, co
     """Whether what autotrack holds can be this pass: late enough, and where it was found so, near the path."""
     if sky.plan is None or now_tai_s < sky.plan.rise_tai_s - ACQUIRE_LEAD_S:
         return False
-    if state.track not in (TrackState.IDLE, TrackState.PREPOSITION):
+    if state.track not in BEFORE:
         return True
     target = path_point(sky, now_tai_s)
     if target is None:
@@ -97,9 +98,9 @@ def _of_plan(state: ControlState, status: Status, sky: Sky, now_tai_s: float, co
     causes: set[Cause] = set()
     if sky.prediction is not None and now_tai_s >= plan.rise_tai_s - config.preposition_s:
         causes.add(Cause.PASS_NEAR)
-    target = path_point(sky, now_tai_s)
-    if target is not None and now_tai_s >= plan.rise_tai_s - ACQUIRE_LEAD_S:
-        causes |= _of_place(state, status, sky, target, config)
+    if state.track in BEFORE and now_tai_s >= plan.rise_tai_s - ACQUIRE_LEAD_S:
+        target = path_point(sky, now_tai_s)
+        causes |= _of_place(state, status, sky, target, config) if target is not None else set()
     return causes
 
 

@@ -109,9 +109,12 @@ TABLE: tuple[Row, ...] = (
 )
 
 
+_ROWS = {state: tuple(row for row in TABLE if state in row.sources) for state in TrackState}
+
+
 def transition(state: TrackState, causes: Set[Cause]) -> tuple[TrackState, Cause] | None:
     """The next state and its cause, or None when nothing changes."""
-    for row in TABLE:
-        if state in row.sources and row.cause in causes:
+    for row in _ROWS[state]:
+        if row.cause in causes:
             return row.target, row.cause
     return None

@@ -228,7 +228,7 @@ def _wanted(state: ControlState, sky: Sky, now_tai_s: float, config: ControlConf
     lag_az_s, lag_el_s = state.lag_s(config) if is_followed else (0.0, 0.0)
     aim_tai_s = now_tai_s + config.effect_delay_s + config.period_s / 2
     az = _point(state, sky, aim_tai_s + lag_az_s, config, is_followed=is_followed)
-    el = _point(state, sky, aim_tai_s + lag_el_s, config, is_followed=is_followed)
+    el = az if lag_el_s == lag_az_s else _point(state, sky, aim_tai_s + lag_el_s, config, is_followed=is_followed)
     if az is None or el is None:
         return _rest(state, is_followed=is_followed)
     az_deg = _on_turn(az.az_deg, state, config, is_followed=is_followed)

@@ -2,7 +2,7 @@
 
 import asyncio
 import contextlib
-from collections import deque
+from array import array
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +19,7 @@ EXCHANGE_DEADLINE_S = 0.090  # a reply is complete within this of the start of t
 CYCLE_SHARE = 0.95  # an exchange goes beside the write only if both fit into this share of the period, ICD section 6
 FIRST_BACK_OFF_S = 0.1
 LAST_BACK_OFF_S = 1.0  # a pass is short: more than a second of waiting costs more than an attempt
+LATENCY_COUNT = 100
 LONGEST_EXTRA = 18  # bytes of the longest housekeeping exchange that goes beside a write, ICD section 6
 
 
@@ -40,7 +41,8 @@ class AcuPort:
         self._address = address
         self._exchange = HostExchange(address)
         self._period_s = period_s
-        self._latencies_s: deque[float] = deque([device_delay_s], maxlen=100)
+        self._latencies_s = array("d", [device_delay_s] * LATENCY_COUNT)  # of the newest exchanges, in no order
+        self._latency_count = 0
         self._both_count = sum(exchange_bytes(WriteAndPoll(0.0, 0.0))) + 1 + LONGEST_EXTRA + 1  # with an idle byte each
         self._log: Any = structlog.get_logger("link")
         self._reopen = asyncio.Event()
@@ -110,7 +112,8 @@ class AcuPort:
             self.failed_exchange_count += 1
             return Answer(None, started_tai_s, None)
         self.last_reply_s = self._clock.monotonic_s()
-        self._latencies_s.append(max(0.0, self.last_reply_s - started_s - wire_s))
+        self._latencies_s[self._latency_count % LATENCY_COUNT] = max(0.0, self.last_reply_s - started_s - wire_s)
+        self._latency_count += 1
         first_byte_tai_s = None if first_byte_s is None else started_tai_s + first_byte_s - started_s
         return Answer(reply, started_tai_s, first_byte_tai_s)
 

@@ -1,5 +1,8 @@
 """The 23 characters of the status block (ICD section 3).  A malformed block raises FieldError."""
 
+from functools import lru_cache
+from typing import Any
+
 from acu_daemon.protocol.angles import azimuth_code, azimuth_deg, elevation_code, elevation_deg
 from acu_daemon.protocol.fields import FieldError, bits_value, hex_text, hex_value, nibble_values, nibbles_text
 from acu_daemon.protocol.messages import AcuMode, Backup, Status
@@ -31,42 +34,52 @@ def decode_status(text: str) -> Status:
     """Read a status block.  FieldError: wrong length, hex, nibble, mode or backup."""
     if len(text) != STATUS_CHARS:
         raise FieldError(f"status block of {len(text)} characters, expected {STATUS_CHARS}")
-    n1, n2, n3, n4, n5, n6, n7, n8 = nibble_values(text[15:])
+    flags = _flags(text[15:])
+    code = hex_value(text[:15])
+    return Status(
+        az_deg=azimuth_deg(code >> 44),
+        el_deg=elevation_deg(code >> 28 & 0xFFFF),
+        tilt_deg=elevation_deg(code >> 12 & 0xFFFF),
+        agc_db=(code & 0xFFF) * AGC_LSB_DB,
+        **flags,
+    )
+
+
+@lru_cache(maxsize=64)
+def _flags(text: str) -> dict[str, Any]:
+    """Read the eight nibbles, which stay the same from one status to most of the next: fields of `Status`."""
+    n1, n2, n3, n4, n5, n6, n7, n8 = nibble_values(text)
     try:
         mode, backup = AcuMode(n1), Backup(n2 & 3)
     except ValueError as error:
         raise FieldError(str(error)) from None
-    return Status(
-        az_deg=azimuth_deg(hex_value(text[0:4])),
-        el_deg=elevation_deg(hex_value(text[4:8])),
-        tilt_deg=elevation_deg(hex_value(text[8:12])),
-        agc_db=hex_value(text[12:15]) * AGC_LSB_DB,
-        mode=mode,
-        backup_selected=backup,
-        is_backup_active=bool(n2 & 4),
-        is_autotrack_selected=bool(n2 & 8),
-        is_acquired=bool(n3 & 1),
-        is_loss_latched=bool(n3 & 2),
-        is_track_valid=bool(n3 & 4),
-        is_receiver_valid=bool(n3 & 8),
-        is_remote_enabled=bool(n4 & 1),
-        are_registers_written=bool(n4 & 2),
-        are_registers_idle=bool(n4 & 4),
-        has_changed=bool(n4 & 8),
-        has_azimuth_fault=bool(n5 & 1),
-        has_elevation_fault=bool(n5 & 2),
-        has_tilt_fault=bool(n5 & 4),
-        has_interlock_fault=bool(n5 & 8),
-        is_at_cw_limit=bool(n6 & 1),
-        is_at_ccw_limit=bool(n6 & 2),
-        is_azimuth_clamped=bool(n6 & 4),
-        is_sector_high=bool(n6 & 8),
-        is_at_up_limit=bool(n7 & 1),
-        is_at_down_limit=bool(n7 & 2),
-        is_elevation_clamped=bool(n7 & 4),
-        is_stow_pin_in=bool(n7 & 8),
-        is_tilt_fitted=bool(n8 & 1),
-        is_tilt_moving=bool(n8 & 2),
-        is_at_tilt_upper_limit=bool(n8 & 4),
-        is_at_tilt_lower_limit=bool(n8 & 8),
-    )
+    return {
+        "mode": mode,
+        "backup_selected": backup,
+        "is_backup_active": bool(n2 & 4),
+        "is_autotrack_selected": bool(n2 & 8),
+        "is_acquired": bool(n3 & 1),
+        "is_loss_latched": bool(n3 & 2),
+        "is_track_valid": bool(n3 & 4),
+        "is_receiver_valid": bool(n3 & 8),
+        "is_remote_enabled": bool(n4 & 1),
+        "are_registers_written": bool(n4 & 2),
+        "are_registers_idle": bool(n4 & 4),
+        "has_changed": bool(n4 & 8),
+        "has_azimuth_fault": bool(n5 & 1),
+        "has_elevation_fault": bool(n5 & 2),
+        "has_tilt_fault": bool(n5 & 4),
+        "has_interlock_fault": bool(n5 & 8),
+        "is_at_cw_limit": bool(n6 & 1),
+        "is_at_ccw_limit": bool(n6 & 2),
+        "is_azimuth_clamped": bool(n6 & 4),
+        "is_sector_high": bool(n6 & 8),
+        "is_at_up_limit": bool(n7 & 1),
+        "is_at_down_limit": bool(n7 & 2),
+        "is_elevation_clamped": bool(n7 & 4),
+        "is_stow_pin_in": bool(n7 & 8),
+        "is_tilt_fitted": bool(n8 & 1),
+        "is_tilt_moving": bool(n8 & 2),
+        "is_at_tilt_upper_limit": bool(n8 & 4),
+        "is_at_tilt_lower_limit": bool(n8 & 8),
+    }
