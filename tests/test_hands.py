@@ -339,11 +339,29 @@ def test_after_any_other_fault_the_daemon_goes_on_by_itself(faults: Faults) -> N
     assert any(isinstance(command, WriteAndPoll) for command in sent)
 
 
-def test_a_person_who_arms_while_the_button_is_still_pressed_is_obeyed_when_it_is_released() -> None:
-    state, _ = run(moving(), PRESSED)
+@pytest.mark.parametrize("by", ["the emergency stop", "a person"])
+def test_p1_armed_while_the_button_is_still_pressed_it_is_disarmed_again_and_does_not_move_at_the_release(
+    by: str,
+) -> None:
+    state, _ = run(moving(), PRESSED, requests=(Request.DISARM,) if by == "a person" else ())
     state, _ = run(state, PRESSED, 5, extra=Exchange(ReadFaults(), Faults(interlock=1)))
-    state, _ = run(state, PRESSED, 5, requests=(Request.ARM,))
+    assert state.disarmed_by == by
+    state, sent = run(state, PRESSED, requests=(Request.ARM,))
+    state, more = run(state, PRESSED)
+    assert ReadFaults() in sent + more
+    state, _ = run(state, PRESSED, 5, extra=Exchange(ReadFaults(), Faults(interlock=1)))
+    assert (state.is_armed(GUARDED), state.disarmed_by) == (False, "the emergency stop")
+
+
+def test_p1_armed_in_any_other_fault_the_daemon_goes_on_when_it_is_over() -> None:
+    state, _ = run(moving(), PRESSED, requests=(Request.DISARM,))
+    state, _ = run(state, PRESSED, 5, requests=(Request.ARM,))  # FAULT DETAIL names neither the button nor a door
     assert state.is_armed(GUARDED)
+
+
+def test_a_shadow_leaves_it_as_it_was_who_holds_the_antenna() -> None:
+    state, _ = run(moving(), status(AcuMode.AUTOTRACK), 3, config=replace(GUARDED, is_shadow=True))
+    assert state.held == Held()
 
 
 # The fence

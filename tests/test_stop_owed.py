@@ -39,6 +39,11 @@ def test_p6_the_stop_of_a_latch_that_was_not_acknowledged_yet_outlives_what_a_pe
     assert asked(replace(latched(), in_force=None), *requests).is_stop_due  # in a daemon that was started again
 
 
+def test_p1_disarmed_in_a_daemon_that_was_started_again_what_the_one_before_has_moved_is_stopped() -> None:
+    assert asked(replace(moving(), in_force=None), Request.DISARM).is_stop_due
+    assert not asked(replace(moving(), in_force=None, held=None), Request.DISARM).is_stop_due  # it is somebody else's
+
+
 @pytest.mark.parametrize("requests", [(Request.CLEAR,), (Request.DISARM, Request.CLEAR, Request.ARM)])
 def test_cleared_and_armed_the_daemon_goes_on_and_owes_no_stop(requests) -> None:
     assert not asked(latched(), *requests).is_stop_due
@@ -169,3 +174,46 @@ def test_p4_started_again_without_a_link_and_ended_it_stops_what_the_one_before_
         rig.end_and_run_again()
         assert rig.acu.status().mode is AcuMode.STANDBY
         assert task.result().is_stopped
+
+
+@pytest.mark.parametrize("after_s", [0.001, 0.15, 0.4])
+@pytest.mark.parametrize("is_cut", [False, True], ids=["", "the link comes back later"])
+def test_p1_disarmed_soon_after_a_crash_it_stops_what_the_one_before_has_left(
+    tmp_path: Path, after_s: float, *, is_cut: bool
+) -> None:
+    with Rig(tmp_path, demo_scene()) as rig:
+        rig.wait(6.0)
+        rig.link.is_cut = is_cut
+        rig.crash(0.0)
+        rig.link.is_cut = is_cut
+        rig.wait(after_s)
+        rig.ask("disarm")
+        rig.wait(1.0)
+        rig.link.is_cut = False
+        rig.wait(3.0)
+        assert rig.acu.status().mode is AcuMode.STANDBY
+
+
+@pytest.mark.parametrize("is_latched", [False, True])
+def test_p1_disarmed_without_a_link_and_killed_the_next_one_stops_it_and_only_once(
+    tmp_path: Path, *, is_latched: bool
+) -> None:
+    with Rig(tmp_path, demo_scene()) as rig:
+        rig.wait(6.0)
+        rig.link.is_cut = True
+        rig.wait(1.0)
+        if is_latched:
+            (tmp_path / "latch").write_text("azimuth stands still\n2026-08-18T01:00:00Z\n")
+        rig.ask("disarm")
+        rig.wait(0.5)
+        rig.crash(0.0)
+        rig.link.is_cut = False
+        rig.wait(3.0)
+        assert rig.acu.status().mode is AcuMode.STANDBY
+        sent: list[Command] = []
+        judge_sent = rig.judge.sent
+        rig.judge.sent = lambda command: (sent.append(command), judge_sent(command))[1]  # type: ignore[method-assign]
+        rig.crash(0.0)
+        rig.wait(3.0)
+        assert sent
+        assert Stop() not in sent

@@ -92,7 +92,7 @@ def _first_state(left: RunState, latch: str, disarmed_by: str) -> ControlState:
         arming=False if is_disarmed else left.arming,
         disarmed_by=disarmed_by or ("a person, before the restart" if is_disarmed else ""),
         latch=latch,
-        is_stop_due=bool(latch) and not is_disarmed,
+        is_stop_due=left.held is not None if is_disarmed else bool(latch),  # disarmed it is held until STOP
         held=None if left.held is None else Held(left.held),
         is_stow_kept=left.is_stow_kept,
     )

@@ -35,10 +35,11 @@ def obey(state: ControlState, requests: Iterable[Request], config: ControlConfig
             if not state.is_armed(config):
                 events.append(Event("armed"))
                 is_stop_due = state.is_stop_due and bool(state.latch)
-                state = changed(_anew(state), arming=True, disarmed_by="", is_stop_due=is_stop_due)
+                state = changed(_anew(state), arming=True, disarmed_by="", is_stop_due=is_stop_due, faults_read=None)
         elif request is Request.DISARM and state.is_armed(config):
+            is_ours = state.in_force is not None or state.held is not None  # the latter of a daemon that was killed
             state = _disarm(state, "a person", events)
-            state = changed(state, is_stop_due=state.is_stop_due or state.in_force is not None)
+            state = changed(state, is_stop_due=state.is_stop_due or is_ours)
     return state
 
 
@@ -97,10 +98,17 @@ def settle_doubt(state: ControlState, seen: Observation, events: list[Event]) ->
 
 
 def note_held(state: ControlState, config: ControlConfig) -> ControlState:
-    """Remember that the daemon holds the antenna, through lost links and new starts until the ACU says otherwise."""
+    """Remember that the daemon holds the antenna, through lost links and new starts until the ACU says otherwise.
+
+    Disarmed or latched it holds it until its STOP is acknowledged.
+    """
     status = state.status
+    if config.is_shadow:  # it belongs to the daemon that commands, before or after this one
+        return state
     if not state.is_armed(config) or state.latch:
-        return changed(state, held=None)
+        has_fault = status is not None and status.has_interlock_fault
+        held = (state.held or Held(has_fault)) if state.is_stop_due else None
+        return state if held == state.held else changed(state, held=held)
     if status is None or state.track is TrackState.LINK_LOST or state.is_stop_doubted:
         return state
     is_held = state.track in ACTIVE if state.stage is Stage.READY else state.held is not None

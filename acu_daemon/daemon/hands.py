@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 
 from acu_daemon.control.state import ControlConfig, Request
+from acu_daemon.control.states import TrackState
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.snapshot import Snapshot
 
@@ -41,6 +42,8 @@ class Hands:
         self._ask(request)
         if request is Request.ARM and state.latch:
             return f"ok armed, but latched: {state.latch}; look at the antenna, then `acu-daemon clear`"
+        if request is Request.ARM and state.track is TrackState.FAULT:
+            return "ok armed, but the ACU reports a fault: an emergency stop or an open door disarms again until it is over"
         return {
             Request.ARM: "ok armed",
             Request.DISARM: "ok disarmed: STOP is sent if the daemon moves the antenna, then nothing",

@@ -98,7 +98,8 @@ class Service:
         self._stop_reason = ""
         self._started_tai_s = math.inf
         self._log: Any = structlog.get_logger("pass")
-        is_stop_due = job.state.is_stop_due and job.state.is_armed(job.control)  # else the antenna is not ours
+        is_ours = job.state.is_armed(job.control) or job.state.held is not None
+        is_stop_due = job.state.is_stop_due and is_ours and not job.control.is_shadow
         self._area = CommonArea(state=replace(job.state, is_stop_due=is_stop_due))
         self._port = AcuPort(link, clock, job.address, job.control.period_s, job.device_delay_s)
         self._background = Background(
@@ -208,7 +209,7 @@ class Service:
 
     def _leave(self, *, is_stopped: bool) -> None:
         """Whoever starts next must not take our stop for another hand's."""
-        if is_stopped and self._on_state is not None:
+        if is_stopped and self._on_state is not None and not self._job.control.is_shadow:
             self._on_state(replace(self._area.state, held=None))
 
     def _after_tick(self) -> None:
