@@ -2,12 +2,14 @@
 
 import asyncio
 import contextlib
+import errno
 import os
 import socket
 import stat
 from pathlib import Path
 
 import pytest
+import structlog
 from command_line import acu_daemon
 
 from acu_daemon.edge.control_socket import LONGEST_LINE, MOST_AT_ONCE, SOCKET, ControlSocket, ask
@@ -92,6 +94,44 @@ async def test_a_crowd_is_let_in_a_few_at_a_time_and_answered(tmp_path: Path) ->
         one.close()
     await asyncio.sleep(0.01)
     await channel.close()
+
+
+@pytest.mark.parametrize("why", [errno.EROFS, errno.ENOSPC])
+async def test_p4_where_the_disk_fails_the_daemon_goes_on_without_and_stays_the_only_one(
+    why: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(why, os.strerror(why))
+
+    channel, second = ControlSocket(tmp_path, answer), ControlSocket(tmp_path, answer)
+    monkeypatch.setattr(socket.socket, "bind", fail)
+    with structlog.testing.capture_logs() as log:
+        await channel.open()
+    (told,) = log
+    assert (told["event"], told["reason"]) == ("control.no_socket", os.strerror(why))
+    monkeypatch.undo()
+    with pytest.raises(UsageError, match="another daemon runs with this state directory"):
+        await second.open()
+    await channel.close()
+    await channel.close()
+    await second.open()
+    assert await asked(tmp_path, "clear") == "clear"
+    await second.close()
+
+
+async def test_a_socket_that_may_not_be_made_for_another_reason_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    channel, second = ControlSocket(tmp_path, answer), ControlSocket(tmp_path, answer)
+    monkeypatch.setattr(socket.socket, "bind", refuse)
+    with pytest.raises(UsageError, match="cannot be made: Permission denied; choose another place with --state DIR"):
+        await channel.open()
+    monkeypatch.undo()
+    await second.open()  # the lock is free again
+    await second.close()
 
 
 async def test_a_path_too_long_for_an_address_works_too(tmp_path: Path) -> None:

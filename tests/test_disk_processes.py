@@ -66,6 +66,10 @@ class SmallDisk:
     def free(self) -> None:
         (self.place / "ballast").unlink()
 
+    def make_read_only(self) -> None:
+        """As the system does with a disk that reports errors."""
+        subprocess.run(["mount", "-o", "remount,ro", str(self.place)], check=True)
+
     def unmount(self) -> None:
         subprocess.run(["umount", "--lazy", str(self.place)], check=True)
 
@@ -125,7 +129,7 @@ class Run:
         wait_until(is_full, "a disk that is full")
 
     def play(self) -> "Run":
-        """Full from the start; a crash; room; full in mid-pass, a person's word and another crash; room; the end."""
+        """Full from the start; a crash; room; full in mid-pass, a person's word, another crash; room; then read-only."""
         self.disk.fill()
         self.rig.start_acu()
         self.start()
@@ -162,6 +166,12 @@ class Run:
         assert self.rig.daemon.wait(PATIENCE_S) == 0
         self.keep_log()
         self.files = {path.name: path.read_bytes() for path in self.disk.place.iterdir()}
+        self.disk.make_read_only()
+        self.rig.start_daemon()
+        self.track()
+        self.rig.daemon.send_signal(signal.SIGTERM)
+        assert self.rig.daemon.wait(PATIENCE_S) == 0
+        self.keep_log()
         self.rig.stop()
         return self
 
@@ -206,7 +216,7 @@ def test_p10_a_disk_that_is_full_from_the_start_is_told_once_and_shown_in_the_st
 
 
 def test_p4_p10_a_daemon_that_is_killed_on_a_full_disk_starts_and_tracks_again(run: "Future[Run]") -> None:
-    first, second, third = run.result().logs
+    first, second, third, _ = run.result().logs
     assert "run.resumed" not in events(second)  # nothing could be kept
     assert "run.resumed" in events(third)  # what was kept before the disk was full again
     for log in (first, second, third):
@@ -216,7 +226,7 @@ def test_p4_p10_a_daemon_that_is_killed_on_a_full_disk_starts_and_tracks_again(r
 
 def test_p10_with_room_again_everything_is_written_again_and_nothing_is_torn(run: "Future[Run]") -> None:
     played = run.result()
-    *_, third = played.logs
+    *_, third, _ = played.logs
     assert set(played.files) == {RUN_STATE, CARRY_OVER, "snapshot.json", "readings.csv"}
     for name, data in played.files.items():
         if name.endswith(".json"):
@@ -241,9 +251,22 @@ def test_p10_the_recording_has_every_second_in_which_there_was_room(run: "Future
 
 
 def test_p8_p10_ticks_went_on_on_the_full_disk(run: "Future[Run]") -> None:
-    *_, third = run.result().logs
+    *_, third, _ = run.result().logs
     (done,) = [entry for entry in third if entry["event"] == "run.done"]
     late = ", ".join(f"{done[f'lateness_{name}_ms']:.2f}" for name in ("p50", "p99", "max"))
     print(f"late 50 / 99 % / max, ms: {late}; {done['skipped_tick_count']} of {done['tick_count']} ticks skipped")
     assert done["is_stopped"]
     assert done["skipped_tick_count"] <= MOST_SKIPPED_SHARE * done["tick_count"]
+
+
+def test_p4_p10_a_daemon_whose_disk_is_read_only_from_the_start_tracks_and_says_what_it_cannot_do(
+    run: "Future[Run]",
+) -> None:
+    *_, last = run.result().logs
+    assert "AUTOTRACK/FITTED" in [entry.get("state") for entry in last]
+    (told,) = [entry for entry in last if entry["event"] == "control.no_socket"]
+    assert told["reason"] == "Read-only file system"
+    assert "arm, disarm, clear and status cannot reach" in told["advice"]
+    assert events(last).count("run_state.not_saved") == 1
+    (done,) = [entry for entry in last if entry["event"] == "run.done"]
+    assert done["is_stopped"]

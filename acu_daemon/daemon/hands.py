@@ -43,7 +43,7 @@ class Hands:
         if request is Request.ARM and state.latch:
             return f"ok armed, but latched: {state.latch}; look at the antenna, then `acu-daemon clear`"
         if request is Request.ARM and state.track is TrackState.FAULT:
-            return "ok armed, but the ACU reports a fault: an emergency stop or an open door disarms again until it is over"
+            return "ok armed, but the ACU reports a fault: an emergency stop or an open door disarms again"
         return {
             Request.ARM: "ok armed",
             Request.DISARM: "ok disarmed: STOP is sent if the daemon moves the antenna, then nothing",

@@ -5,13 +5,18 @@ The daemon answers `ok ...` or `error ...`.  Whoever may write to the socket may
 
 import asyncio
 import contextlib
+import errno
 import fcntl
 import os
 import socket
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
+import structlog
+
+from acu_daemon.edge.carry_over import reason_of
 from acu_daemon.errors import AcuDaemonError, UsageError
 
 SOCKET = "control.sock"
@@ -22,6 +27,8 @@ MOST_CLIENTS = 8
 MOST_AT_ONCE = 2  # clients let in by one turn of the loop: a hundred, asyncio's own measure, would make a tick late
 ANSWER_S = 3.0
 AGAIN_S = 0.01
+NO_LOCK = -1
+DISK_FAILS = (errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.EIO)
 
 
 class ControlSocket:
@@ -31,28 +38,41 @@ class ControlSocket:
         self._directory = directory
         self._answer = answer
         self._server: asyncio.Server | None = None
-        self._lock = -1
+        self._lock = NO_LOCK
         self._client_count = 0
 
     async def open(self) -> None:
-        """Begin to listen.  UsageError: another daemon runs with this state directory, or it takes no socket."""
+        """Begin to listen; where the disk fails, go on without: the antenna matters more.
+
+        UsageError: another daemon runs with this state directory, or no socket may be made in it.
+        """
         self._lock = _lock(self._directory)
+        path = self._directory / SOCKET
         try:
             listener = _listen(self._directory)
-            self._server = await asyncio.start_unix_server(
-                self._serve, sock=listener, limit=LONGEST_LINE, backlog=MOST_AT_ONCE
-            )
-        except BaseException:
-            os.close(self._lock)
-            raise
+        except OSError as error:
+            if error.errno not in DISK_FAILS:
+                await self.close()
+                advice = "choose another place with --state DIR"
+                raise UsageError(f"{path}: cannot be made: {error.strerror}; {advice}") from None
+            log: Any = structlog.get_logger("control")
+            advice = "arm, disarm, clear and status cannot reach this daemon: mend the disk, then start it again"
+            log.error("control.no_socket", file=str(path), reason=reason_of(error), advice=advice)
+            return
+        self._server = await asyncio.start_unix_server(
+            self._serve, sock=listener, limit=LONGEST_LINE, backlog=MOST_AT_ONCE
+        )
 
     async def close(self) -> None:
         """Stop listening and take the socket away."""
         if self._server is not None:
             self._server.close()
             self._server = None
-            (self._directory / SOCKET).unlink(missing_ok=True)
+            with contextlib.suppress(OSError):  # the disk may be read-only by now
+                (self._directory / SOCKET).unlink(missing_ok=True)
+        if self._lock != NO_LOCK:
             os.close(self._lock)
+            self._lock = NO_LOCK
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._client_count += 1
@@ -162,7 +182,7 @@ def _listen(directory: Path) -> socket.socket:
             os.umask(before)
         listener.listen()
         listener.setblocking(False)
-    except OSError as error:
+    except BaseException:
         listener.close()
-        raise UsageError(f"{path}: cannot be made: {error.strerror}; choose another place with --state DIR") from None
+        raise
     return listener
