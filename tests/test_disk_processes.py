@@ -129,7 +129,7 @@ class Run:
         wait_until(is_full, "a disk that is full")
 
     def play(self) -> "Run":
-        """Full from the start; a crash; room; full in mid-pass, a person's word, another crash; room; then read-only."""
+        """Full from the start; a crash; room; full in mid-pass, a disarm, another crash; room; then read-only."""
         self.disk.fill()
         self.rig.start_acu()
         self.start()
