@@ -239,7 +239,8 @@ class Rig:
     # The daemon
 
     def start(self) -> None:
-        """Start a daemon on what the last one left."""
+        """Start a daemon on what the last one left, with the clock right: one wrong from the start is not told."""
+        self.system_offset_s = self.true_offset_s
         self._runner.run(self._start())
 
     async def _start(self) -> None:
@@ -279,7 +280,6 @@ class Rig:
         self.task.cancel()
         self._runner.run(asyncio.wait([self.task]))
         self.judge.crashed()
-        self.system_offset_s = self.true_offset_s
         self._runner.run(asyncio.sleep(pause_s + RESTART_S))
         self.start()
 
@@ -288,7 +288,6 @@ class Rig:
         self.service.stop("SIGTERM")
         self._runner.run(asyncio.wait([self.task]))
         self.judge.ended(self.task.result() if self.task.exception() is None else None)
-        self.system_offset_s = self.true_offset_s
         self._runner.run(asyncio.sleep(RESTART_S))
         self.start()
 
