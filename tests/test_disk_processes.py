@@ -169,6 +169,7 @@ class Run:
         self.disk.make_read_only()
         self.rig.start_daemon()
         self.track()
+        wait_until(lambda: self.has_told("carry_over.not_saved"), "that the fit cannot be kept was told")
         self.rig.daemon.send_signal(signal.SIGTERM)
         assert self.rig.daemon.wait(PATIENCE_S) == 0
         self.keep_log()
@@ -267,6 +268,7 @@ def test_p4_p10_a_daemon_whose_disk_is_read_only_from_the_start_tracks_and_says_
     (told,) = [entry for entry in last if entry["event"] == "control.no_socket"]
     assert told["reason"] == "Read-only file system"
     assert "arm, disarm, clear and status cannot reach" in told["advice"]
-    assert events(last).count("run_state.not_saved") == 1
+    for name in ("run_state.not_saved", "carry_over.not_saved"):
+        assert events(last).count(name) == 1
     (done,) = [entry for entry in last if entry["event"] == "run.done"]
     assert done["is_stopped"]

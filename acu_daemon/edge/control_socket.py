@@ -16,7 +16,6 @@ from typing import Any
 
 import structlog
 
-from acu_daemon.edge.carry_over import reason_of
 from acu_daemon.errors import AcuDaemonError, UsageError
 
 SOCKET = "control.sock"
@@ -57,7 +56,7 @@ class ControlSocket:
                 raise UsageError(f"{path}: cannot be made: {error.strerror}; {advice}") from None
             log: Any = structlog.get_logger("control")
             advice = "arm, disarm, clear and status cannot reach this daemon: mend the disk, then start it again"
-            log.error("control.no_socket", file=str(path), reason=reason_of(error), advice=advice)
+            log.error("control.no_socket", file=str(path), reason=error.strerror, advice=advice)
             return
         self._server = await asyncio.start_unix_server(
             self._serve, sock=listener, limit=LONGEST_LINE, backlog=MOST_AT_ONCE
