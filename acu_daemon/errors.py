@@ -4,6 +4,7 @@ AcuDaemonError
 ├── UsageError              wrong use or configuration; exit status 2
 │   ├── ConfigError         a TOML file: says file, key, value, what was expected
 │   └── ElementsError       an element set: says file, line, reason
+├── CampaignError           runs of a campaign failed; names them
 ├── OrbitError              a propagator has no answer (decayed, outside its span)
 ├── LinkError               the connection to the ACU failed
 │   └── LinkRefusedError    another client holds the ACU, or nobody listens
@@ -25,6 +26,10 @@ class ConfigError(UsageError):
 
 class ElementsError(UsageError):
     """An element set cannot be used; the message names file, line and reason."""
+
+
+class CampaignError(AcuDaemonError):
+    """Runs of a campaign failed; the message names them, and why."""
 
 
 class OrbitError(AcuDaemonError):

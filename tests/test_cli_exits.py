@@ -61,6 +61,21 @@ def test_every_command_has_help_that_names_its_options(command: str) -> None:
     assert command in acu_daemon("--help").out
 
 
+def test_a_group_runs_its_command_with_only_that_module_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
+    group = app.Group("Of the sky.", {"coming": ("passes", "command"), "lost": ("no_such_module", "command")})
+    monkeypatch.setitem(app.GROUPS, "sky", group)
+    done = acu_daemon("sky", "coming", "--help")
+    assert done.code == 0
+    assert "Usage: acu-daemon sky coming" in done.out
+    assert acu_daemon("sky", "coming", "--fast").code == 2
+    monkeypatch.setitem(app.GROUPS, "sky", app.Group(group.help, {"coming": ("passes", "command")}))
+    for text in (acu_daemon("sky", "--help").out, acu_daemon("sky").err):
+        assert "Of the sky." in text
+        assert "coming" in text
+    assert acu_daemon("sky", "going").code == 2
+    assert "sky" in acu_daemon("--help").out
+
+
 def test_the_help_tells_the_first_steps_and_the_exit_statuses() -> None:
     text = acu_daemon("-h").out
     assert "First steps:" in text

@@ -4,7 +4,8 @@ import gc
 import os
 import sys
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Annotated
 
@@ -14,6 +15,15 @@ from acu_daemon import __version__
 from acu_daemon.errors import AcuDaemonError, NoAcuError, UsageError
 
 EXIT_FAILED, EXIT_USAGE, EXIT_NO_ACU, EXIT_INTERNAL = 1, 2, 3, 4
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Commands under one word, such as `acu-daemon groundtrack simulate`."""
+
+    help: str
+    commands: Mapping[str, tuple[str, str]]  # as in COMMANDS
+
 
 COMMANDS = {  # name: module of acu_daemon.cli, and the function in it
     "run": ("run", "command"),
@@ -30,6 +40,7 @@ COMMANDS = {  # name: module of acu_daemon.cli, and the function in it
     "clear": ("hands", "clear"),
     "status": ("hands", "status"),
 }
+GROUPS: dict[str, Group] = {}
 HELP = """
     Assisted tracking: keeps an antenna on a low-orbit satellite when its signal is lost.
 
@@ -59,29 +70,52 @@ def _common(
     """Options before the command."""
 
 
-def make_app(names: Iterable[str]) -> typer.Typer:
-    """The command line with these commands; only their modules are loaded: a restart in mid-pass is in a hurry."""
-    app = typer.Typer(
-        name="acu-daemon",
+def make_app(asked: Sequence[str]) -> typer.Typer:
+    """The command line for these arguments; of the commands' modules only those that they ask for are loaded.
+
+    A restart in mid-pass is in a hurry.  Where no command is named, for the help, all are loaded.
+    """
+    app = _typer("acu-daemon", HELP)
+    app.callback()(_common)
+    word = asked[0] if asked else ""
+    is_known = word in COMMANDS or word in GROUPS
+    _add(app, COMMANDS, [word] if is_known else COMMANDS)
+    for name in [word] if is_known else GROUPS:
+        if (group := GROUPS.get(name)) is not None:
+            under = _typer(name, group.help)
+            under.callback()(_group)  # so that a group of one command keeps its word
+            _add(under, group.commands, asked[1:2] if asked[1:2] and asked[1] in group.commands else group.commands)
+            app.add_typer(under, name=name)
+    return app
+
+
+def _typer(name: str, text: str) -> typer.Typer:
+    return typer.Typer(
+        name=name,
         no_args_is_help=True,
         add_completion=False,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["-h", "--help"]},
-        help=HELP,
+        help=text,
     )
-    app.callback()(_common)
+
+
+def _group() -> None:
+    pass
+
+
+def _add(app: typer.Typer, commands: Mapping[str, tuple[str, str]], names: Iterable[str]) -> None:
     for name in names:
-        module, function = COMMANDS[name]
-        app.command(name=name)(getattr(import_module(f"acu_daemon.cli.{module}"), function))
-    return app
+        if name in commands:
+            module, function = commands[name]
+            app.command(name=name)(getattr(import_module(f"acu_daemon.cli.{module}"), function))
 
 
 def main() -> None:
     """Run a command; every failure ends with its exit status and a message that says what to do."""
-    asked = sys.argv[1:2]
     try:
-        app = make_app(asked if asked and asked[0] in COMMANDS else COMMANDS)
+        app = make_app(sys.argv[1:])
         gc.freeze()  # what was loaded stays: no collection has to look at it again
         gc.enable()
         app()
