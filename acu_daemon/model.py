@@ -6,6 +6,7 @@ Angles are degrees.  Azimuth is clockwise from true north.  "Encoder frame" mean
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
 from math import asin, cos, degrees, radians, sin, sqrt
 from typing import Literal
 
@@ -151,6 +152,19 @@ class FitResult:
 PredictionKind = Literal["FITTED", "TLE"]
 
 
+class Model(StrEnum):
+    """What a prediction is made from."""
+
+    ELEMENTS = "elements"
+    LAST_PASS = "last pass"
+    NEW_FIT = "new fit"
+
+    @property
+    def kind(self) -> PredictionKind:
+        """What the names of the states call it."""
+        return "FITTED" if self is Model.NEW_FIT else "TLE"
+
+
 @dataclass(frozen=True, slots=True)
 class Pointing:
     """A direction of the prediction at one instant."""
@@ -180,6 +194,7 @@ class Prediction:
     kind: PredictionKind
     made_at_tai_s: float
     sigma_deg: Array | None = None
+    model: Model = Model.ELEMENTS  # the kind, more closely
 
     @property
     def end_tai_s(self) -> float:

@@ -73,7 +73,7 @@ def test_without_a_link_no_angle_is_shown_as_if_it_were_measured() -> None:
 def test_what_is_not_known_is_a_dash() -> None:
     text = live_text(replace(SEEN, miss_deg=None, along_s=None, across_deg=None, az_deg=None))
     assert "off prediction     - deg" in text
-    assert "no fit yet" in text
+    assert "no fit in force" in text
 
 
 def test_p10_a_file_that_cannot_be_written_stands_on_it_and_on_the_services_line() -> None:

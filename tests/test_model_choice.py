@@ -8,10 +8,10 @@ from made_orbits import circular, site, visible
 
 from acu_daemon.assist.carry_over import CarryOver, carry_over_of
 from acu_daemon.assist.gate import BELIED, WRONG_TARGET
-from acu_daemon.assist.model_choice import Model, ModelChoice, choose, newest_residual_deg
+from acu_daemon.assist.model_choice import ModelChoice, choose, newest_residual_deg
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.control.refit import CARRIED_S, DROPPED, RefitReply, RefitRequest, RefitSetup, Refitter
-from acu_daemon.model import AxisLimits, Correction, FitResult, Readings
+from acu_daemon.model import AxisLimits, Correction, FitResult, Model, Readings
 from acu_daemon.orbit.look import look_at
 
 NOISE_DEG = 0.03
@@ -134,3 +134,13 @@ def test_what_the_last_pass_left_is_no_model_for_an_estimator_without_a_covarian
     refitter = Refitter(RefitSetup(SOURCE, WHERE, "kalman", SETTINGS, AZIMUTH, carried=_left(LATE)))
     now_tai_s = float(_path(LATE, 1).tai_s[0])
     assert refitter.refit(RefitRequest(Readings.of([]), now_tai_s, 2.0, now_tai_s, 180.0)).model is Model.ELEMENTS
+
+
+def test_the_buffer_says_what_it_is_made_from() -> None:
+    refitter = Refitter(RefitSetup(SOURCE, WHERE, "full", SETTINGS, AZIMUTH, carried=_left(LATE)))
+    readings = _path(LATE, 60)
+    now_tai_s = float(readings.tai_s[0])
+    first = refitter.refit(RefitRequest(Readings.of([]), now_tai_s, 2.0, now_tai_s, 180.0))
+    replies = _replies(refitter, readings)
+    assert (first.prediction.model, first.prediction.kind) == (Model.LAST_PASS, "TLE")
+    assert (replies[-1].prediction.model, replies[-1].prediction.kind) == (Model.NEW_FIT, "FITTED")

@@ -225,6 +225,37 @@ def test_a_loss_with_a_fit_is_held_on_the_fit_and_without_one_on_the_elements() 
     assert step(TrackState.AUTOTRACK_TLE, lost)[0].track is TrackState.HOLD_TLE
 
 
+@pytest.mark.parametrize(
+    ("track", "mode", "after"),
+    [
+        (TrackState.AUTOTRACK_FITTED, AcuMode.AUTOTRACK, TrackState.AUTOTRACK_TLE),
+        (TrackState.HOLD_FITTED, AcuMode.REMOTE_BACKUP, TrackState.HOLD_TLE),
+    ],
+)
+def test_the_state_says_what_steers_also_when_the_elements_steer_again(
+    track: TrackState, mode: AcuMode, after: TrackState
+) -> None:
+    before = replace(ready(track, status(mode)), hold_from_tai_s=NOW - 40.0)
+    state, orders = tick(before, saw(status(mode)), SKY, NOW, CONFIG)
+    assert state.track is after
+    assert "newer readings deny the fit" in str(orders.events[0].fields["cause"])
+    assert state.hold_from_tai_s == NOW - 40.0  # the loss is no younger for it
+    assert tick(before, saw(status(mode)), FITTED, NOW, CONFIG)[0].track is track
+
+
+@pytest.mark.parametrize(("sky", "after"), [(SKY, TrackState.HOLD_TLE), (FITTED, TrackState.HOLD_FITTED)])
+def test_after_a_search_the_state_names_what_it_goes_back_to(sky: Sky, after: TrackState) -> None:
+    before = replace(ready(TrackState.SEARCH, status(AcuMode.ACQUIRE)), entered_tai_s=NOW - 121.0)
+    assert tick(before, saw(status(AcuMode.ACQUIRE)), sky, NOW, CONFIG)[0].track is after
+
+
+@pytest.mark.parametrize("config", [CONFIG, replace(CONFIG, is_armed=False)])
+@pytest.mark.parametrize("track", [TrackState.IDLE, TrackState.ACQUIRE_TLE])
+def test_where_a_fit_steers_no_state_says_that_the_elements_do(config: ControlConfig, track: TrackState) -> None:
+    state, _ = tick(ready(track, status(AcuMode.ACQUIRE)), saw(status(AcuMode.ACQUIRE)), FITTED, NOW, config)
+    assert state.track is TrackState.HOLD_FITTED
+
+
 @pytest.mark.parametrize(("has_locked", "track"), [(False, TrackState.SEARCH), (True, TrackState.HOLD_TLE)])
 def test_a_signal_that_was_never_locked_is_searched_for_after_acquire_s(has_locked: bool, track: TrackState) -> None:
     lost = status(AcuMode.REMOTE_BACKUP, is_acquired=False)

@@ -5,26 +5,17 @@ GD 7200, reference/field.md).
 """
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
 from acu_daemon.assist.offsets import angles_deg
-from acu_daemon.model import FitResult, Readings, Site
+from acu_daemon.model import FitResult, Model, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
 
 NEWEST_S = 5.0
 RESET_AFTER_COUNT = 3
 BAD_SIGMAS = 3.0  # a smaller residual is never bad
 BAD_RATIO = 1.5  # nor one that is not so much larger than the best other model's
-
-
-class Model(StrEnum):
-    """What the prediction is made from."""
-
-    ELEMENTS = "elements"
-    LAST_PASS = "last pass"
-    NEW_FIT = "new fit"
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,7 +42,8 @@ def _of_others(state: ControlState, status: Status, sky: Sky, now_tai_s: float, 
     if not status.is_autotrack_selected:
         return {Cause.HANDS_OFF}
     causes = _of_signal(state, status, sky, now_tai_s, config)
-    return causes | (_of_plan(state, status, sky, now_tai_s, config) & {Cause.PASS_OVER, Cause.STILL_SELECTED})
+    still = {Cause.PASS_OVER, Cause.STILL_SELECTED, Cause.STILL_FITTED}
+    return causes | (_of_plan(state, status, sky, now_tai_s, config) & still)
 
 
 def _of_status(status: Status, *, is_stow_kept: bool) -> set[Cause]:
@@ -64,7 +65,9 @@ def is_acquired(status: Status) -> bool:
 
 def _of_signal(state: ControlState, status: Status, sky: Sky, now_tai_s: float, config: ControlConfig) -> set[Cause]:
     has_fit = sky.prediction is not None and sky.prediction.kind == "FITTED"
-    causes = {Cause.FIT} if has_fit else set()
+    causes: set[Cause] = set()
+    if sky.prediction is not None:
+        causes.add(Cause.FIT if has_fit else Cause.FIT_LEFT)
     if is_acquired(status):
         if _is_ours(state, status, sky, now_tai_s, config):
             causes.add(Cause.ACQUIRED_FITTED if has_fit else Cause.ACQUIRED)
@@ -155,5 +158,6 @@ def _of_time(state: ControlState, sky: Sky, now_tai_s: float, config: ControlCon
     if state.track in HOLDING and now_tai_s - state.hold_from_tai_s > hold_s:
         causes.add(Cause.HOLD_OVER)
     if state.track is TrackState.SEARCH and in_state_s > config.search_s:
-        causes.add(Cause.SEARCH_OVER)
+        has_fit = sky.prediction is not None and sky.prediction.kind == "FITTED"
+        causes.add(Cause.SEARCH_OVER_FITTED if has_fit else Cause.SEARCH_OVER)
     return causes

@@ -11,11 +11,11 @@ from acu_daemon.assist.carry_over import CarryOver, aged_prior, first_fit
 from acu_daemon.assist.estimator import Estimator, EstimatorSettings, has_covariance, make_estimator
 from acu_daemon.assist.full import FullEstimator, shift_for_people
 from acu_daemon.assist.gate import OUTLIER
-from acu_daemon.assist.model_choice import Model, ModelChoice, choose, is_good, newest_residual_deg
+from acu_daemon.assist.model_choice import ModelChoice, choose, is_good, newest_residual_deg
 from acu_daemon.assist.prediction import predict
 from acu_daemon.assist.spans import span_s
 from acu_daemon.assist.track_gate import TrackGate
-from acu_daemon.model import AxisLimits, FitResult, Prediction, PredictionKind, Readings, Site
+from acu_daemon.model import AxisLimits, FitResult, Model, Prediction, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.pointing.keyhole import follow_path, longest_window_s
 
@@ -194,8 +194,7 @@ class Refitter:
             if fit.rejected_count:
                 counts[OUTLIER] = counts.get(OUTLIER, 0) + fit.rejected_count
             fit = replace(fit, rejected_count=sum(counts.values()))
-        kind: PredictionKind = "FITTED" if model is Model.NEW_FIT else "TLE"
-        prediction = predict_from(self._setup, models.get(model), request, kind)
+        prediction = predict_from(self._setup, models.get(model), request, model)
         verdict = GateVerdict(self._gate.rejecting if len(request.readings) else "", counts, self._gate.reset_count)
         return RefitReply(fit if model is Model.NEW_FIT else None, prediction, notes, model, verdict)
 
@@ -216,17 +215,17 @@ def before_fit(setup: RefitSetup, now_tai_s: float) -> FitResult | None:
     return replace(fit, along_s=along_s, across_deg=across_deg, covariance=covariance)
 
 
-def predict_from(setup: RefitSetup, fit: FitResult | None, request: RefitRequest, kind: PredictionKind) -> Prediction:
-    """Make the buffer from the orbit that a fit found, or from the elements alone.
+def predict_from(setup: RefitSetup, fit: FitResult | None, request: RefitRequest, model: Model) -> Prediction:
+    """Make the buffer from the orbit that a fit found, or from the elements alone.  model: which of them it is.
 
     Raises: OrbitError: the propagator has no answer for the span.
     """
-    return predict(
+    prediction = predict(
         setup.propagator if fit is None else setup.propagator.corrected(fit.correction),
         setup.site,
         request.start_tai_s,
         made_at_tai_s=request.now_tai_s,
-        kind=kind,
+        kind=model.kind,
         horizon_s=request.horizon_s,
         step_s=setup.step_s,
         near_az_deg=request.near_az_deg,
@@ -234,3 +233,4 @@ def predict_from(setup: RefitSetup, fit: FitResult | None, request: RefitRequest
         follow=partial(follow_path, azimuth=setup.azimuth),
         fit=fit,
     )
+    return replace(prediction, model=model)

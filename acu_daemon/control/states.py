@@ -48,11 +48,13 @@ class Cause(StrEnum):
     ACQUIRED = "the signal is acquired"
     ACQUIRED_FITTED = "the signal is acquired and a fit of this pass exists"
     FIT = "a fit was accepted"
+    FIT_LEFT = "newer readings deny the fit: the prediction is made from the elements again"
     LOST = "the signal is lost"
     MODE_LEFT = "the ACU left the mode by itself (power cycle, or another hand)"
     ACQUIRE_OVER = "no signal within acquire_s"
     HOLD_OVER = "no signal within hold_s"
     SEARCH_OVER = "no signal within search_s"
+    SEARCH_OVER_FITTED = "no signal within search_s around this pass's fit"
 
 
 S = TrackState
@@ -96,6 +98,8 @@ TABLE: tuple[Row, ...] = (
     Row(frozenset({S.PREPOSITION}), Cause.ON_POINT_FITTED, S.HOLD_FITTED),
     Row(frozenset({S.PREPOSITION}), Cause.ON_POINT, S.ACQUIRE_TLE, "20 s before the rise or later"),
     Row(TRACKING, Cause.MODE_LEFT, S.IDLE),
+    Row(frozenset({S.AUTOTRACK_FITTED}), Cause.FIT_LEFT, S.AUTOTRACK_TLE),
+    Row(frozenset({S.HOLD_FITTED}), Cause.FIT_LEFT, S.HOLD_TLE),
     Row(frozenset({S.ACQUIRE_TLE, S.SEARCH}), Cause.ACQUIRED_FITTED, S.AUTOTRACK_FITTED),
     Row(frozenset({S.ACQUIRE_TLE, S.SEARCH, S.HOLD_TLE}), Cause.ACQUIRED, S.AUTOTRACK_TLE),
     Row(frozenset({S.ACQUIRE_TLE}), Cause.ACQUIRE_OVER, S.SEARCH, "acquire_s after the rise"),
@@ -103,8 +107,9 @@ TABLE: tuple[Row, ...] = (
     Row(frozenset({S.AUTOTRACK_TLE}), Cause.LOST, S.HOLD_TLE),
     Row(frozenset({S.AUTOTRACK_TLE}), Cause.FIT, S.AUTOTRACK_FITTED, "lock_dwell_s and the first fit"),
     Row(frozenset({S.HOLD_FITTED}), Cause.ACQUIRED, S.AUTOTRACK_FITTED),
-    Row(frozenset({S.HOLD_TLE}), Cause.FIT, S.HOLD_FITTED, "a fit that ends just after the loss"),
+    Row(frozenset({S.HOLD_TLE, S.ACQUIRE_TLE}), Cause.FIT, S.HOLD_FITTED, "a fit that ends just after the loss"),
     Row(HOLDING, Cause.HOLD_OVER, S.SEARCH, "hold_s after 3 sigma left the beam, or the loss; never locked: acquire_s"),
+    Row(frozenset({S.SEARCH}), Cause.SEARCH_OVER_FITTED, S.HOLD_FITTED, "search_s"),
     Row(frozenset({S.SEARCH}), Cause.SEARCH_OVER, S.HOLD_TLE, "search_s"),
 )
 

@@ -125,7 +125,7 @@ def _walk(
     step = transition(state.track, causes)
     if step is None:
         return state
-    track, cause = step
+    before, (track, cause) = state.track, step
     events.append(
         Event(
             "state.changed",
@@ -140,7 +140,7 @@ def _walk(
             state, stage=Stage.NEW, last_extra=None, axis_az=None, axis_el=None, last_write_tai_s=None, commands=()
         )
         state = changed(state, watchdog=watchdog, axes=AxesWatch(), is_place_sure=False)
-    if track in HOLDING:
+    if track in HOLDING and before not in HOLDING:
         state = changed(state, hold_from_tai_s=now_tai_s)
     return state
 

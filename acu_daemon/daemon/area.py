@@ -4,10 +4,9 @@ from collections import deque
 from dataclasses import dataclass, field
 
 from acu_daemon.assist.gate import DWELL
-from acu_daemon.assist.model_choice import Model
 from acu_daemon.control.refit import GateVerdict
 from acu_daemon.control.state import ControlState, Sky
-from acu_daemon.model import Reading, Readings
+from acu_daemon.model import Model, Reading, Readings
 
 
 @dataclass(slots=True)
@@ -20,8 +19,12 @@ class CommonArea:
     refit_count: int = 0
     refit_failed_count: int = 0
     gate: GateVerdict = GateVerdict()
-    model: Model = Model.ELEMENTS
     dwell_count: int = 0  # readings acquired, but not yet for the dwell time
+
+    @property
+    def model(self) -> Model | None:
+        """What the prediction in force is made from."""
+        return self.sky.prediction.model if self.sky.prediction is not None else None
 
     @property
     def rejected_counts(self) -> dict[str, int]:

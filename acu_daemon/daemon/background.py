@@ -8,7 +8,6 @@ from typing import Any
 import structlog
 
 from acu_daemon.assist.gate import ABOVE_MAX_ELEVATION
-from acu_daemon.assist.model_choice import Model
 from acu_daemon.control.refit import GateVerdict, RefitReply, RefitRequest, RefitSetup, before_fit, predict_from
 from acu_daemon.control.state import PassPlan
 from acu_daemon.control.states import AUTOTRACKING, HOLDING, TrackState
@@ -16,7 +15,7 @@ from acu_daemon.daemon.area import CommonArea
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.fit import FitDiedError, FitFailedError, FitRunner
 from acu_daemon.errors import OrbitError
-from acu_daemon.model import FitResult, Readings
+from acu_daemon.model import FitResult, Model, Readings
 
 REFIT_PERIOD_S = 1.0  # an accepted fit replaces the buffer at least once a second while locked
 PAST_S = 1.0  # the buffer starts this long before now: readings are compared at the time of their sample
@@ -61,7 +60,6 @@ class Background:
         self._log: Any = structlog.get_logger("fit")
         if setup.is_resumed:
             area.sky = replace(area.sky, fit=before_fit(setup, clock.tai_s()))
-            area.model = Model.NEW_FIT
             area.state = replace(area.state, has_acquired=True)
 
     def wake(self) -> None:
@@ -131,12 +129,20 @@ class Background:
             return
         request = self._request(now_tai_s, Readings.of([]))
         try:
-            fit = before_fit(self._setup, now_tai_s) if sky.fit is None else sky.fit
-            prediction = predict_from(self._setup, fit, request, "TLE" if sky.fit is None else "FITTED")
+            fit, model = self._in_force(now_tai_s)
+            prediction = predict_from(self._setup, fit, request, model)
         except OrbitError as error:
             self._log.warning("prediction.failed", reason=str(error))
             return
         self._area.sky = replace(sky, prediction=prediction)
+
+    def _in_force(self, now_tai_s: float) -> tuple[FitResult | None, Model]:
+        """What the last buffer was made from, so that the next one goes on from it."""
+        fit, model = self._area.sky.fit, self._area.model
+        if fit is not None:
+            return fit, Model.NEW_FIT
+        carried = None if model is Model.ELEMENTS else before_fit(self._setup, now_tai_s)
+        return carried, Model.ELEMENTS if carried is None else Model.LAST_PASS
 
     def _request(self, now_tai_s: float, readings: Readings) -> RefitRequest:
         start_tai_s = now_tai_s - PAST_S
@@ -174,7 +180,8 @@ class Background:
         if reply.gate.reset_count > before.reset_count:
             self._log.warning("fit.reset", reason="newer readings belie what was fitted before")
         if reply.model is not self._area.model:
-            self._log.info("model.changed", model=str(reply.model), before=str(self._area.model))
+            before_it = str(self._area.model or "none")
+            self._log.info("model.changed", model=str(reply.model), before=before_it)
 
     def _take(self, reply: RefitReply, *, has_readings: bool) -> None:
         area = self._area
@@ -193,7 +200,7 @@ class Background:
         if reply.fit is not None and self._on_fit is not None:
             self._on_fit(reply.fit)
         area.refit_count += 1
-        area.gate, area.model = reply.gate, reply.model
+        area.gate = reply.gate
         area.sky = replace(area.sky, prediction=reply.prediction, fit=reply.fit)
 
     def set_plan(self, plan: PassPlan) -> None:

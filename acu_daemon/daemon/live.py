@@ -5,6 +5,7 @@ import sys
 from typing import Protocol
 
 from acu_daemon.daemon.snapshot import Snapshot
+from acu_daemon.model import Model
 from acu_daemon.orbit.timescales import utc_text
 
 EVERY_TICKS = 2
@@ -28,7 +29,7 @@ def live_text(seen: Snapshot, beam_error_deg: float | None = None) -> str:
         side = "late" if seen.along_s >= 0 else "early"
         correction = f"{abs(seen.along_s):5.2f} s {side:5} {seen.across_deg:+6.3f} deg across"
     else:
-        correction = "no fit yet"
+        correction = "no fit in force"
     parts = [
         f"{utc_text(seen.tai_s, 1)[11:]} {mark}".rstrip(),
         hands,
@@ -37,7 +38,7 @@ def live_text(seen: Snapshot, beam_error_deg: float | None = None) -> str:
         miss,
         correction,
         _inside(seen),
-        f"buffer {seen.buffer_s:3.0f} s {seen.buffer_kind}",
+        f"buffer {seen.buffer_s:3.0f} s {seen.buffer_kind}{' (last pass)' if seen.model == Model.LAST_PASS else ''}",
         f"rejecting: {seen.rejecting}" if seen.rejecting else "",
         seen.encoder_problem,
         seen.clock_alarm,

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from acu_daemon.control.state import ControlConfig, ControlState
-from acu_daemon.control.states import AUTOTRACKING
+from acu_daemon.control.states import AUTOTRACKING, TrackState
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.foreground import Foreground
 from acu_daemon.daemon.port import AcuPort
@@ -85,8 +85,8 @@ def take_snapshot(
         command_az_deg=state.axis_az.position_deg if state.axis_az else None,
         command_el_deg=state.axis_el.position_deg if state.axis_el else None,
         agc_db=status.agc_db if status else None,
-        is_acquired=reading is not None and reading.is_locked,
-        miss_deg=_miss_deg(reading, prediction),
+        is_acquired=state.track is not TrackState.LINK_LOST and reading is not None and reading.is_locked,
+        miss_deg=None if state.track is TrackState.LINK_LOST else _miss_deg(reading, prediction),
         along_s=sky.fit.along_s if sky.fit else None,
         across_deg=sky.fit.across_deg if sky.fit else None,
         fit_age_s=now_tai_s - sky.fit.at_tai_s if sky.fit else None,
@@ -117,7 +117,7 @@ def take_snapshot(
         link_problem=port.problem,
         is_rehearsal=is_rehearsal,
         is_simulation=identity is not None and identity.is_simulated,
-        model=str(area.model),
+        model=str(area.model or ""),
         rejecting=area.gate.rejecting if state.track in AUTOTRACKING else "",
         rejected_counts=area.rejected_counts,
     )
