@@ -2,6 +2,7 @@
 
 import json
 import os
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from script_modules import load
 
 bench_tick, tick_rig, process_load = load("bench_tick"), load("tick_rig"), load("process_load")
 
+RESOLUTION_S = 2 / os.sysconf("SC_CLK_TCK")  # of two figures, user and system
 QUIET = tick_rig.Ticks(
     condition="idle",
     antennas=1,
@@ -70,7 +72,10 @@ def test_cyclictests_histogram_is_read() -> None:
 
 def test_memory_and_processor_time_of_a_process_are_read() -> None:
     pid = os.getpid()
-    assert process_load.cpu_s(pid) > 0.0
+    before_s = os.times()
+    read_s = process_load.cpu_s(pid)
+    after_s = os.times()
+    assert before_s.user + before_s.system - RESOLUTION_S <= read_s <= after_s.user + after_s.system + RESOLUTION_S
     alone_mb = process_load.memory_mb([pid])
     assert alone_mb > 10.0
     assert process_load.memory_mb([pid, pid]) < 2 * alone_mb
@@ -79,12 +84,14 @@ def test_memory_and_processor_time_of_a_process_are_read() -> None:
 @pytest.mark.realtime
 @pytest.mark.parametrize(("name", "antennas"), [("polled", 1), ("fifo", 2)])
 def test_a_few_seconds_of_a_locked_daemon_are_measured(tmp_path: Path, name: str, antennas: int) -> None:
+    began_s = time.monotonic()
     ticks = tick_rig.run_condition(tmp_path, tick_rig.CONDITIONS[name], antennas, 3.0, lambda _: None)
-    assert ticks.tick_count + ticks.skipped_tick_count == pytest.approx(30 * antennas, abs=10 * antennas)
+    most_count = 10 * antennas * (time.monotonic() - began_s)
+    assert 10 * antennas <= ticks.tick_count + ticks.skipped_tick_count <= most_count
     assert 0.0 <= ticks.p50_ms <= ticks.p99_ms <= ticks.max_ms
-    assert ticks.cpu_percent > ticks.fit_cpu_percent > 0.0
+    assert ticks.cpu_percent >= ticks.fit_cpu_percent >= 0.0  # a process may use less than the clock's resolution
     assert (ticks.status_count > 0) == (name == "polled")
-    assert ticks.limit_max_ms > 0.0
+    assert 0.0 <= ticks.limit_p50_ms <= ticks.limit_p99_ms <= ticks.limit_max_ms
     assert ticks.memory_mb > 0.0
     starts = [json.loads(log.read_text().splitlines()[0]) for log in tmp_path.glob("*/daemon.jsonl")]
     expected = "SCHED_FIFO 30" if name == "fifo" and ticks.is_permitted else "SCHED_OTHER"

@@ -2,7 +2,6 @@
 
 import json
 import os
-import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +12,7 @@ from config_files import BROUWER, from_file, replaced, write
 from conftest import DATA, needs_data
 
 from acu_daemon.config import load_satellite, load_station
+from acu_daemon.edge import elements_file
 from acu_daemon.edge.elements_file import LoadedElements, load_elements
 from acu_daemon.errors import ElementsError, UsageError
 from acu_daemon.orbit.timescales import tai_from_utc
@@ -205,40 +205,63 @@ def test_a_real_list_is_searched_by_number(tmp_path: Path) -> None:
 # A file that is being written
 
 
-def load_while(directory: Path, text: str, act: Callable[[], object]) -> LoadedElements:
-    """Load a file that was written just now, while something happens to it half a second later."""
-    load(directory, tle("ISS (ZARYA)"))
-    (directory / "lists" / "active.txt").write_text(text)
-    section, _ = load_satellite(directory, "sat", load_station(directory))
-    timer = threading.Timer(0.5, act)
-    timer.start()
-    try:
-        return load_elements(section, directory / "satellites" / "sat.toml", NOW)
-    finally:
-        timer.join()
+class Writer:
+    """Stands where the module `time` stands: a wait takes no time, and half a second later the file is changed."""
+
+    def __init__(self, act: Callable[[], object]) -> None:
+        self._act, self._begun_s, self.waited_s = act, time.time(), 0.0
+
+    def monotonic(self) -> float:
+        return self.waited_s
+
+    def time(self) -> float:
+        return self._begun_s + self.waited_s
+
+    def sleep(self, seconds: float) -> None:
+        is_due = self.waited_s < 0.5 <= self.waited_s + seconds
+        self.waited_s += seconds
+        if is_due:
+            self._act()
+
+
+@pytest.fixture
+def load_while(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Callable[[str, Callable[[], object]], LoadedElements]:
+    """Loads a file that was written just now, while something happens to it half a second later."""
+
+    def load_and_act(text: str, act: Callable[[], object]) -> LoadedElements:
+        load(tmp_path, tle("ISS (ZARYA)"))
+        (tmp_path / "lists" / "active.txt").write_text(text)
+        section, _ = load_satellite(tmp_path, "sat", load_station(tmp_path))
+        monkeypatch.setattr(elements_file, "time", Writer(act))
+        return load_elements(section, tmp_path / "satellites" / "sat.toml", NOW)
+
+    return load_and_act
 
 
 @pytest.mark.parametrize("size", [0, 15, 90, len(ISS) - 3], ids=["empty", "name", "first line", "second line"])
-def test_a_half_written_file_is_read_again_until_it_is_whole(tmp_path: Path, size: int) -> None:
+def test_a_half_written_file_is_read_again_until_it_is_whole(tmp_path: Path, load_while, size: int) -> None:
     path = tmp_path / "lists" / "active.txt"
-    loaded = load_while(tmp_path, ISS[:size], lambda: path.write_text(ISS))
+    loaded = load_while(ISS[:size], lambda: path.write_text(ISS))
     assert (loaded.label, loaded.errors, loaded.warnings) == ("ISS (ZARYA) (25544)", [], [])
 
 
-def test_a_list_that_is_cut_between_two_satellites_is_read_again(tmp_path: Path) -> None:
+def test_a_list_that_is_cut_between_two_satellites_is_read_again(tmp_path: Path, load_while) -> None:
     path = tmp_path / "lists" / "active.txt"
-    assert load_while(tmp_path, JASON, lambda: path.write_text(JASON + ISS)).label == "ISS (ZARYA) (25544)"
+    assert load_while(JASON, lambda: path.write_text(JASON + ISS)).label == "ISS (ZARYA) (25544)"
 
 
-def test_a_file_that_stays_half_is_refused_all_the_same(tmp_path: Path) -> None:
+def test_a_file_that_stays_half_is_refused_all_the_same(load_while) -> None:
     with pytest.raises(ElementsError):
-        load_while(tmp_path, ISS[:90], lambda: None)
+        load_while(ISS[:90], lambda: None)
 
 
-def test_a_half_file_that_nobody_writes_is_refused_at_once(tmp_path: Path) -> None:
-    begun_s = time.monotonic()
+def test_a_half_file_that_nobody_writes_is_refused_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    writer = Writer(lambda: None)
+    monkeypatch.setattr(elements_file, "time", writer)
     refusal(tmp_path, tle("ISS"), ISS[:90])
-    assert time.monotonic() - begun_s < 1.5
+    assert writer.waited_s == 0.0
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import os
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
@@ -143,9 +144,9 @@ PTY = pytest.mark.parametrize("place", [acu_on_pty, proxy_on_pty])
 @ALL
 async def test_a_cut_line_is_silent_and_speaks_again_on_the_same_connection(place: Place, tmp_path: Path) -> None:
     async with place(tmp_path) as bench:
-        await bench.breaks("cut duration_s=0.5")
+        await bench.breaks("cut")
         assert await bench.is_silent()
-        await asyncio.sleep(0.4)
+        bench.board.clear()
         await bench.answers()
 
 
@@ -168,7 +169,6 @@ async def test_what_a_deaf_acu_was_sent_arrives_when_it_reads_again(place: Place
         await asyncio.sleep(0.2)
         assert not bench.acu.status().are_registers_written
         bench.board.clear()
-        await asyncio.sleep(0.2)
         assert (await bench.answers()).are_registers_written
 
 
@@ -193,13 +193,14 @@ async def test_a_half_open_connection_swallows_writes_and_a_new_one_works(place:
 @TCP
 async def test_a_second_client_takes_the_acu_and_gives_it_back(place: Place, tmp_path: Path) -> None:
     async with place(tmp_path) as bench:
-        await bench.breaks("second-client duration_s=0.5")
+        await bench.breaks("second-client")
         with pytest.raises(LinkError):
             await asyncio.wait_for(bench.link.read(), PATIENCE_S)
         await bench.link.close()
         await bench.link.open()
         with pytest.raises(LinkRefusedError, match="another client holds the ACU"):
             await asyncio.wait_for(bench.link.read(), PATIENCE_S)
+        bench.board.clear()
         assert isinstance(await bench.reopens(), Status)
 
 
@@ -232,12 +233,13 @@ async def test_refused_connections_find_nobody_listening_until_it_ends(place: Pl
 @TCP
 async def test_a_slow_close_keeps_the_place_taken(place: Place, tmp_path: Path) -> None:
     async with place(tmp_path) as bench:
-        await bench.breaks("slow-close value=0.5")
+        await bench.breaks("slow-close value=3600")
         await bench.link.close()
         await asyncio.sleep(0.05)
         await bench.link.open()
         with pytest.raises(LinkRefusedError):
             await asyncio.wait_for(bench.link.read(), PATIENCE_S)
+        bench.board.clear()
         await bench.reopens()
 
 
@@ -246,24 +248,42 @@ async def test_an_adapter_comes_back_under_another_name_behind_the_same_link(pla
     by_id = tmp_path / "by-id"
     async with place(tmp_path) as bench:
         before = by_id.readlink()
-        await bench.breaks("unplug duration_s=0.3")
+        await bench.breaks("unplug")
         with pytest.raises(LinkError, match="hung up"):
             await asyncio.wait_for(bench.link.read(), PATIENCE_S)
         await bench.link.close()
         with pytest.raises(LinkError, match="is the adapter plugged in"):
             await bench.link.open()
+        bench.board.clear()
         assert isinstance(await bench.reopens(), Status)
         assert by_id.readlink() != before
         assert before.parent == by_id.readlink().parent == Path("/dev/pts")
+
+
+@pytest.mark.parametrize("freed_count", range(4))
+async def test_an_adapter_has_another_name_whichever_terminals_have_become_free(
+    tmp_path: Path, freed_count: int
+) -> None:
+    others = [os.openpty() for _ in range(4)]
+    async with acu_on_pty(tmp_path) as bench:
+        before = (tmp_path / "by-id").readlink()
+        for descriptors in others[:freed_count]:
+            for descriptor in descriptors:
+                os.close(descriptor)
+        await bench.breaks("reset")
+        assert (tmp_path / "by-id").readlink() != before
+    for descriptors in others[freed_count:]:
+        for descriptor in descriptors:
+            os.close(descriptor)
 
 
 async def test_an_acu_without_power_is_silent_and_has_forgotten_its_mode(tmp_path: Path) -> None:
     async with acu_on_tcp(tmp_path) as bench:
         bench.acu.set_local(True, START_TAI_S)
         bench.acu.set_local(False, START_TAI_S)
-        await bench.breaks("power-cycle duration_s=0.5")
+        await bench.breaks("power-cycle")
         assert await bench.is_silent()
-        await asyncio.sleep(0.4)
+        bench.board.clear()
         assert (await bench.answers()).mode is AcuMode.STANDBY
 
 

@@ -1,5 +1,6 @@
 """P1, P5, P6: arming, the latch, a STOP by another hand, and the fence, in the pure decision of a tick."""
 
+import itertools
 from dataclasses import replace
 
 import pytest
@@ -7,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from test_tick import CONFIG, FITTED, NOW, SKY, ready, saw, status
 
+from acu_daemon.control.changed import changed
 from acu_daemon.control.fence import READS, refusal
-from acu_daemon.control.state import ControlState, Exchange, Held, Observation, Orders, Request, Stage, Watchdog
+from acu_daemon.control.state import ControlState, Exchange, Held, Observation, Orders, Request, Sky, Stage, Watchdog
 from acu_daemon.control.states import ACTIVE, TrackState
 from acu_daemon.control.tick import tick
 from acu_daemon.protocol.messages import (
@@ -38,6 +40,7 @@ from acu_daemon.protocol.messages import (
 )
 
 GUARDED = replace(CONFIG, register_watchdog_s=5.0)
+SHADOW = replace(GUARDED, is_shadow=True)
 LATCH = "elevation stands still away from its command"
 
 
@@ -424,10 +427,27 @@ def test_p5_no_register_write_outside_the_limits_passes(az_deg, el_deg, kind) ->
 def test_p5_whatever_the_memory_holds_every_order_has_passed_the_fence(
     track, mode, stage, is_remote, is_shadow, arming, latch, is_stop_due, requests, is_fitted
 ) -> None:
-    config = replace(GUARDED, is_shadow=is_shadow)
-    state = replace(moving(track, mode), stage=stage, arming=arming, latch=latch, is_stop_due=is_stop_due)
+    memory = {"stage": stage, "arming": arming, "latch": latch, "is_stop_due": is_stop_due}
     seen = saw(status(mode, is_remote_enabled=is_remote), requests=tuple(requests))
-    after, orders = tick(state, seen, FITTED if is_fitted else SKY, NOW, config)
+    check_fence(replace(moving(track, mode), **memory), seen, FITTED if is_fitted else SKY, is_shadow=is_shadow)
+
+
+@pytest.mark.parametrize("is_shadow", [False, True])
+def test_p5_from_every_state_mode_and_stage_every_order_has_passed_the_fence(is_shadow: bool) -> None:
+    """All there are, where chance would find the one that matters once in thousands."""
+    flags = (False, True)
+    for track, mode in itertools.product(TrackState, AcuMode):
+        begun = moving(track, mode)
+        for is_remote in flags:
+            seen = saw(status(mode, is_remote_enabled=is_remote))
+            for stage, arming, latch, is_due in itertools.product(Stage, (None, *flags), ("", LATCH), flags):
+                state = changed(begun, stage=stage, arming=arming, latch=latch, is_stop_due=is_due)
+                check_fence(state, seen, FITTED if is_due else SKY, is_shadow=is_shadow)
+
+
+def check_fence(state: ControlState, seen: Observation, sky: Sky, *, is_shadow: bool) -> None:
+    config = SHADOW if is_shadow else GUARDED
+    after, orders = tick(state, seen, sky, NOW, config)
     assert after.gate_refusal_count == state.gate_refusal_count  # the fence had nothing to keep back
     for command in (orders.first, orders.extra):
         assert command is None or refusal(command, after, config) == ""

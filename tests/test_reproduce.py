@@ -190,5 +190,5 @@ def test_ctrl_c_ends_a_computation_with_all_its_processes_and_one_line() -> None
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.wait(10.0)
                 break
-        _, said = process.communicate(timeout=1.0)
+        _, said = process.communicate(timeout=10.0)
     assert (process.returncode, said) == (130, "interrupted\n")

@@ -161,7 +161,7 @@ def _extra(state: ControlState, now_tai_s: float, config: ControlConfig) -> Comm
     if wanted is None and now_tai_s - state.reading.tai_s > LINK_SILENCE_S:
         return None  # a status from before an outage: who knows where the antenna is now
     wanted = wanted or question(state) or next_command(state, config)
-    if wanted is None and _are_registers_fresh(state, now_tai_s):
+    if wanted is None and state.is_armed(config) and _are_registers_fresh(state, now_tai_s):
         wanted = wanted_mode_command(state, is_settled=now_tai_s - state.extra_after_tai_s > EXTRA_SETTLED_S)
     if wanted is None or (wanted == state.last_extra and now_tai_s < state.extra_after_tai_s):
         return None

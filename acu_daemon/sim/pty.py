@@ -53,6 +53,7 @@ class _Jack:
         self._make_peer, self._board, self._link = make_peer, board, link
         self._loop = asyncio.get_running_loop()
         self._master = self._slave = -1
+        self._device = ""
         self._peer: Peer | None = None
 
     @property
@@ -64,18 +65,27 @@ class _Jack:
         """Open a terminal and put the link to it; we hold both ends, so that the line outlives its clients."""
         if self._link.exists() and not (self._link.is_symlink() and str(self._link.readlink()).startswith("/dev/pts/")):
             raise UsageError(f"--pty {self._link} exists and is no link to a pseudo terminal; choose another name")
-        self._master, self._slave = os.openpty()
+        self._open()
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
-        device = os.ttyname(self._slave)
         try:
             self._link.unlink(missing_ok=True)
-            self._link.symlink_to(device)
+            self._link.symlink_to(self._device)
         except OSError as error:
             self._close()
             raise UsageError(f"--pty {self._link} cannot be made: {error.strerror}") from None
         self._peer = self._make_peer(self._send, self._replug)
         self._listen()
+
+    def _open(self) -> None:
+        """Open a terminal whose name is not that of the last one: an adapter comes back under another name."""
+        self._master, self._slave = os.openpty()
+        if os.ttyname(self._slave) == self._device:
+            same = self._master, self._slave
+            self._master, self._slave = os.openpty()
+            for descriptor in same:
+                os.close(descriptor)
+        self._device = os.ttyname(self._slave)
 
     def unplug(self) -> None:
         """Close the terminal: its client gets EIO; the link goes."""
@@ -94,16 +104,7 @@ class _Jack:
 
     def _replug(self) -> None:
         self.unplug()
-        self.plug_in_elsewhere()
-
-    def plug_in_elsewhere(self) -> None:
-        """Come back under another device name."""
-        spare = os.openpty()
-        try:
-            self.plug_in()
-        finally:
-            for descriptor in spare:
-                os.close(descriptor)
+        self.plug_in()
 
     def _listen(self) -> None:
         if not self._board.is_on("deaf"):
@@ -124,7 +125,7 @@ class _Jack:
             case "unplug" if is_on:
                 self.unplug()
             case "unplug":
-                self.plug_in_elsewhere()
+                self.plug_in()
             case "reset" if self._master >= 0:
                 self._replug()
             case "deaf" if self._master >= 0:

@@ -8,6 +8,7 @@ import contextlib
 import socket
 import struct
 from collections.abc import AsyncIterator, Callable
+from math import inf
 from typing import Protocol, get_args
 
 from acu_daemon.edge.clock import Clock
@@ -105,6 +106,8 @@ class _Door:
                 self._server = None
             case "refuse" if not is_on:
                 self._opening = self._loop.create_task(self.open(self.port))
+            case "slow-close" if not is_on:
+                self.taken_until_s = -inf
             case "half-open" if client is not None:
                 client.is_dead = True
                 self.client = None  # a new connection works
