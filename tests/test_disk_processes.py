@@ -27,13 +27,13 @@ from acu_daemon.edge.recording import read_readings
 from acu_daemon.edge.run_state import RUN_STATE, read_run_state
 
 pass_rig = load("pass_rig")
-pytestmark = pytest.mark.realtime
+pytestmark = [pytest.mark.realtime, pytest.mark.xdist_group("disk_processes")]
 
 DISK_BYTES = 256 * 1024
 CARRY_OVER = "carry-over-99901.json"
 FULL = "No space left on device"
 TOLD = {"record.failed", "run_state.not_saved", "carry_over.not_saved"}
-MOST_SKIPPED_SHARE = 0.2  # of the ticks, on a machine that does other things as well; a loop that waits skips all
+MOST_SKIPPED_SHARE = 0.5  # of the ticks, on a machine that does other things as well; a loop that waits skips all
 TRACKED_FULL_S = 5.0  # on the full disk
 SLACK_S = 2.0  # until a file is written again, and between two readings on a busy machine
 

@@ -29,7 +29,7 @@ from acu_daemon.report.wire import HALF_SERVO_TICK_S, Writes, read_writes, satel
 from acu_daemon.units import Array
 
 pass_rig = load("pass_rig")
-pytestmark = pytest.mark.realtime
+pytestmark = [pytest.mark.realtime, pytest.mark.xdist_group("fault_processes")]
 
 PATIENCE_S = 60.0  # a hang fails the test; a slow machine does not
 ASKED_DEG = 0.1

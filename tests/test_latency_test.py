@@ -70,10 +70,11 @@ def test_without_a_configuration_the_machine_alone_is_measured(tmp_path: Path) -
     assert "no --config" in tested.out
     assert (tested.code == 1) == ("NO-GO" in said.values())
     read = json.loads(figures.read_text())
-    assert read["tick_count"] + read["skipped_tick_count"] == pytest.approx(20, abs=1)
+    assert read["tick_count"] <= 21
+    assert read["tick_count"] + read["skipped_tick_count"] >= 20
     assert len(read["lateness_ms"]) == read["tick_count"]
     assert min(read["lateness_ms"]) >= 0.0
-    assert read["refit_ms"]
+    assert (said["fit"] == "NO-GO") == (not read["refit_ms"])
     assert read["round_trip_ms"] == []
     assert picture.read_bytes().startswith(b"\x89PNG")
 
@@ -82,10 +83,11 @@ def test_without_a_configuration_the_machine_alone_is_measured(tmp_path: Path) -
 def test_the_acu_is_polled_and_told_nothing_else(tmp_path: Path) -> None:
     with real_acu() as (url, asked):
         (tmp_path / "station.toml").write_text(STATION.replace("tcp://127.0.0.1:3842", url))
-        tested = acu_daemon("latency-test", "--duration", "2", "--config", tmp_path)
+        figures = tmp_path / "figures.json"
+        tested = acu_daemon("latency-test", "--duration", "2", "--config", tmp_path, "--json", figures)
     assert tested.code in (0, 1), tested.err
     assert set(asked) == {Poll()}
-    assert len(asked) >= 10
+    assert len(asked) >= json.loads(figures.read_text())["tick_count"] > 0
     assert "polls lost" in tested.out
     assert "WRITE AND STATUS" in tested.out
 

@@ -1,6 +1,6 @@
 """The real commands as processes of their own, on the real clock, over TCP and a paced pseudo terminal.
 
-Asserts what happened and counts, never speed: the machine may be busy.  The long bench runs beside all other tests.
+Asserts what happened and counts, never speed: the machine may be busy.
 """
 
 import contextlib
@@ -51,12 +51,6 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator["Future[dict[str
         yield pool.submit(run)
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _the_bench_begins_with_the_first_test(request: pytest.FixtureRequest) -> None:
-    if any("bench" in getattr(item, "fixturenames", ()) for item in request.session.items):
-        request.getfixturevalue("bench")
-
-
 @pytest.fixture
 def rig(tmp_path: Path) -> Iterator[Any]:
     """A rig over TCP under two minutes of the demo's satellite; nothing is started yet."""
@@ -80,7 +74,6 @@ def silence(rig: Any) -> None:
 
 def last_mode(rig: Any) -> str:
     """Mode of the simulated ACU at its end."""
-    time.sleep(0.5)  # until the trace has it
     rig.stop()
     mode: str = read_trace(rig.trace).mode[-1]
     return mode
@@ -241,6 +234,7 @@ def test_a_rehearsal_writes_nothing_to_an_acu_that_says_it_is_a_real_one(rig: An
     )
 
 
+@pytest.mark.xdist_group("bench")
 @pytest.mark.parametrize("link", ["tcp", "pty"])
 def test_a_pass_with_a_loss_is_tracked_over_both_links(bench: "Future[dict[str, Any]]", link: str) -> None:
     result = bench.result()[link]
@@ -250,6 +244,7 @@ def test_a_pass_with_a_loss_is_tracked_over_both_links(bench: "Future[dict[str, 
     assert result.losses.relock_s <= 3.0
     assert result.writes.autotrack_max_deg <= MAX_ERROR_DEG
     assert result.writes.rate_share <= 1.0
-    assert 9.0 <= result.writes.writes_per_s <= 10.2
+    ticked_share = result.tick_count / (result.tick_count + result.skipped_tick_count)
+    assert 9.0 * ticked_share <= result.writes.writes_per_s <= 10.2
     assert (result.refusal_count, result.refit_failed_count) == (0, 0)
     assert result.refit_count > 10

@@ -18,7 +18,7 @@ from acu_daemon.sim.acu_faults import break_acu
 from acu_daemon.sim.build import build_fake_acu
 from acu_daemon.sim.fault_board import FaultBoard
 from acu_daemon.sim.fault_verbs import FRAME_VERBS, PEDESTAL_VERBS
-from acu_daemon.sim.server import acu_peer, keep_time
+from acu_daemon.sim.server import ADVANCE_S, acu_peer, keep_time
 from acu_daemon.sim.trace import TraceWriter
 from acu_daemon.sim.wire_log import WireLogWriter
 
@@ -112,4 +112,7 @@ async def _serve(acu: FakeAcu, clock: SystemClock, place: Place, control: str | 
     board = FaultBoard(FRAME_VERBS | PEDESTAL_VERBS | place.line_verbs)
     break_acu(acu, board, clock)
     peer, faults = acu_peer(acu, clock, board, place.baud), acu.parts.scenario.faults
-    await serve_until_stopped(peer, board, place, control, faults, lambda: keep_time(acu, clock))
+    try:
+        await serve_until_stopped(peer, board, place, control, faults, lambda: keep_time(acu, clock))
+    finally:
+        acu.advance(clock.tai_s() + ADVANCE_S)  # the trace's last line shows how the antenna was left
