@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from acu_daemon.cli.options import Config, Target, ending, load_target, not_covered, parse_utc
+from acu_daemon.cli.options import NEXT_PASS_DAYS, Config, Target, ending, load_target, not_covered, parse_utc
 from acu_daemon.config import load_station, satellite_names
 from acu_daemon.control.plan import plan_pass
 from acu_daemon.edge.clock import SystemClock, is_clock_synchronised
@@ -160,11 +160,11 @@ def _next_pass(name: str, target: Target, now_tai_s: float) -> Iterator[Finding]
     station = target.station
     lowest_deg = station.station.min_elevation_deg
     passes = find_passes(target.elements.propagator, station.site, now_tai_s, now_tai_s + DAY_S, lowest_deg)
+    is_ephemeris = target.elements.propagator.kind == "oem"
     if not passes:
         until = ending(target, now_tai_s + DAY_S)
-        yield Finding(
-            WARN, f"{name}: next pass", f"none above {lowest_deg:g} deg within a day" + (until and f"; {until}")
-        )
+        text = f"none above {lowest_deg:g} deg within a day" + (until and f"; {until}")
+        yield Finding(NO_GO if until and not is_ephemeris else WARN, f"{name}: next pass", text)
         return
     coming = passes[0]
     if lacking := not_covered(target, coming, now_tai_s):
@@ -176,6 +176,8 @@ def _next_pass(name: str, target: Target, now_tai_s: float) -> Iterator[Finding]
         f"{utc_text(coming.rise_tai_s, 0)}, {coming.duration_s / 60:.1f} min, up to "
         f"{coming.culmination_el_deg:.1f} deg",
     )
+    if not is_ephemeris and (until := ending(target, now_tai_s + NEXT_PASS_DAYS * DAY_S)):
+        yield Finding(WARN, f"{name}: decay", until)
     limits = station.acu.azimuth.limits()
     middle_deg = (limits.min_deg + limits.max_deg) / 2
     plan = plan_pass(target.elements.propagator, station.site, coming, middle_deg, limits, coming.rise_tai_s)

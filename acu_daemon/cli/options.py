@@ -19,6 +19,7 @@ from acu_daemon.errors import ElementsError, UsageError
 from acu_daemon.model import Pass
 from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.propagator import spans_tai_s
+from acu_daemon.orbit.sgp4_source import Sgp4Propagator
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 from acu_daemon.pointing.keyhole import longest_window_s
 from acu_daemon.units import DAY_S
@@ -127,9 +128,14 @@ def _passes_until(target: Target, now_tai_s: float, end_tai_s: float) -> list[Pa
 
 
 def ending(target: Target, end_tai_s: float) -> str:
-    """Say that no pass is known up to the end of a search, empty where the elements reach that far."""
-    last_tai_s = spans_tai_s(target.elements.propagator)[-1][1]
-    return "" if last_tai_s >= end_tai_s else f"the ephemeris ends at {utc_text(last_tai_s, 0)}"
+    """Say that nothing is known up to the end of a search, empty where the elements reach that far."""
+    propagator = target.elements.propagator
+    last_tai_s = spans_tai_s(propagator)[-1][1]
+    if last_tai_s >= end_tai_s:
+        return ""
+    if isinstance(propagator, Sgp4Propagator):
+        return f"from {utc_text(last_tai_s, 0)} on the elements know nothing: {propagator.end_reason}"
+    return f"the ephemeris ends at {utc_text(last_tai_s, 0)}"
 
 
 def not_covered(target: Target, coming: Pass, now_tai_s: float) -> str:
@@ -144,9 +150,12 @@ def not_covered(target: Target, coming: Pass, now_tai_s: float) -> str:
 
 
 def lacking(target: Target, what: str, from_tai_s: float, to_tai_s: float) -> str:
-    """Say that an ephemeris does not cover a span for what it is needed; empty where the elements do."""
+    """Say that an ephemeris does not cover a span for what it is needed; empty where the elements do.
+
+    A satellite about to decay is followed as long as anything is known of it.
+    """
     spans = spans_tai_s(target.elements.propagator)
-    if any(start <= from_tai_s and to_tai_s <= end for start, end in spans):
+    if target.elements.propagator.kind != "oem" or any(start <= from_tai_s and to_tai_s <= end for start, end in spans):
         return ""
     covered = " and ".join(f"{utc_text(start, 0)} to {utc_text(end, 0)}" for start, end in spans)
     return (
@@ -156,16 +165,17 @@ def lacking(target: Target, what: str, from_tai_s: float, to_tai_s: float) -> st
 
 
 def cut_passes(target: Target, passes: list[Pass]) -> list[str]:
-    """Say which passes begin or end only because an ephemeris does."""
+    """Say which passes begin or end only because an ephemeris does, or because the satellite decays."""
     spans = spans_tai_s(target.elements.propagator)
+    what = "the ephemeris" if target.elements.propagator.kind == "oem" else "what the elements know"
     starts, ends = {start for start, _ in spans}, {end for _, end in spans}
     said = []
     for one in passes:
         of = f"the pass from {utc_text(one.rise_tai_s, 0)} to {utc_text(one.set_tai_s, 0)} is cut:"
         if one.rise_tai_s in starts:
-            said.append(f"{of} the ephemeris begins within it")
+            said.append(f"{of} {what} begins within it")
         if one.set_tai_s in ends:
-            said.append(f"{of} the ephemeris ends within it")
+            said.append(f"{of} {what} ends within it")
     return said
 
 

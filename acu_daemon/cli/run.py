@@ -28,6 +28,7 @@ from acu_daemon.cli.options import (
     Target,
     check_duration,
     coming_pass,
+    ending,
     load_target,
     make_clock,
 )
@@ -50,6 +51,7 @@ from acu_daemon.edge.writer import QueuedStream, Writer
 from acu_daemon.model import Pass
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.protocol.sa3842 import address_byte
+from acu_daemon.units import DAY_S
 
 STDERR = 2
 SNAPSHOT_TICKS = 5  # where no live line is drawn: a snapshot costs a tenth of a tick
@@ -191,6 +193,8 @@ def _announce(target: Target, coming: Pass, clock: SystemClock, *, is_shadow: bo
     )
     for warning in target.elements.warnings:
         log.warning("elements.warning", reason=warning)
+    if until := ending(target, coming.set_tai_s + DAY_S):
+        log.warning("elements.ending", reason=until)
     if is_shadow:
         log.warning("run.shadow", reason="--shadow: nothing is written to the ACU, whatever happens")
     elif target.station.safety.arm == "manual":

@@ -16,9 +16,11 @@ from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.fit import FitDiedError, FitFailedError, FitRunner
 from acu_daemon.errors import OrbitError
 from acu_daemon.model import FitResult, Model, Readings
+from acu_daemon.orbit.propagator import spans_tai_s
 
 REFIT_PERIOD_S = 1.0  # an accepted fit replaces the buffer at least once a second while locked
 PAST_S = 1.0  # the buffer starts this long before now: readings are compared at the time of their sample
+LEAST_HORIZON_S = 10.0  # of a buffer, also where the satellite is about to decay
 RETRY_S = 0.5
 LONGEST_PAUSE_S = 30.0  # a fit process that dies again and again is started this often at last
 FIRST_FIT_COUNT = 5  # a fit to fewer readings is no better than the offset that carries the path until then
@@ -50,6 +52,7 @@ class Background:
         self._low_water_s = low_water_s
         self._preposition_s = preposition_s
         self._on_fit = on_fit
+        self._last_known_tai_s = spans_tai_s(setup.propagator)[-1][1]
         self._due = asyncio.Event()
         self._last_tai_s = -1e18
         self._has_asked = False
@@ -146,10 +149,11 @@ class Background:
 
     def _request(self, now_tai_s: float, readings: Readings) -> RefitRequest:
         start_tai_s = now_tai_s - PAST_S
+        known_s = self._last_known_tai_s - start_tai_s
         return RefitRequest(
             readings=readings,
             start_tai_s=start_tai_s,
-            horizon_s=self._horizon_s + PAST_S,
+            horizon_s=max(min(self._horizon_s + PAST_S, known_s), LEAST_HORIZON_S),
             now_tai_s=now_tai_s,
             near_az_deg=self._near_az_deg(start_tai_s),
         )
