@@ -84,13 +84,17 @@ def test_old_elements_are_warned_of_and_still_shown(config: Path) -> None:
 def test_a_decayed_satellite_hides_no_other_one(tmp_path: Path) -> None:
     write(tmp_path, gone=from_file("GONE", "tle", "gone.tle"), scd=BROUWER)
     (tmp_path / "satellites" / "gone.tle").write_text(DECAYING)
-    start = ("--from", "2006-06-19T12:00:00Z")
+    start = ("--from", "2006-06-19T14:00:00Z")
     all_of_them = acu_daemon("passes", "--config", tmp_path, *start, "--json")
     assert all_of_them.code == 0
     assert "warning: gone is left out: NORAD 29141: no position at " in all_of_them.err
-    assert {one["satellite"] for one in json.loads(all_of_them.out)} == {"scd"}
+    found = json.loads(all_of_them.out)
+    assert {one["satellite"] for one in found["passes"]} == {"scd"}
+    [omitted] = found["omitted"]
+    assert omitted["satellite"] == "gone"
+    assert "the satellite has decayed" in omitted["reason"]
     alone = acu_daemon("passes", "--config", tmp_path, *start, "--satellite", "gone")
-    assert alone.code == 1
+    assert (alone.code, alone.out) == (2, "")
     assert "the satellite has decayed" in alone.err
 
 

@@ -128,10 +128,18 @@ def test_the_same_question_has_the_same_answer_bit_for_bit() -> None:
     assert find_passes(propagator, SITE, 0.0, SPAN_S, 3.0) == find_passes(propagator, SITE, 0.0, SPAN_S, 3.0)
 
 
-def test_a_decayed_satellite_is_an_error() -> None:
+def test_the_passes_of_a_decaying_satellite_end_with_it() -> None:
+    # decays 7 hours after its epoch (Vallado et al., AIAA 2006-6753)
     text = """1 29141U 85108AA  06170.26783845  .99999999  00000-0  13519-0 0   718
 2 29141  82.4288 273.4882 0015848 277.2124  83.9133 15.93343074  6828
 """
     [one], [] = parse_tle(text, "deb.tle")
+    propagator = Sgp4Propagator(one)
+    north = Site(Station("north", 80.0, 0.0, 0.0))
+    known_s = 7.0 * 3600.0
+    during = find_passes(propagator, north, one.epoch_tai_s, one.epoch_tai_s + known_s, 0.0)
+    assert len(during) >= 3
+    assert find_passes(propagator, north, one.epoch_tai_s, one.epoch_tai_s + 30 * DAY_S, 0.0)[: len(during)] == during
+    assert find_passes(propagator, north, one.epoch_tai_s + DAY_S, one.epoch_tai_s + 30 * DAY_S, 0.0) == []
     with pytest.raises(OrbitError, match="has decayed"):
-        find_passes(Sgp4Propagator(one), SITE, one.epoch_tai_s, one.epoch_tai_s + DAY_S, 5.0)
+        look_at(propagator, np.array([one.epoch_tai_s + DAY_S]), north)

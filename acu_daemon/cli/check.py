@@ -11,7 +11,16 @@ from typing import Annotated
 
 import typer
 
-from acu_daemon.cli.options import NEXT_PASS_DAYS, Config, Target, ending, load_target, not_covered, parse_utc
+from acu_daemon.cli.options import (
+    NEXT_PASS_DAYS,
+    Config,
+    Target,
+    ending,
+    load_target,
+    not_covered,
+    open_ends,
+    parse_utc,
+)
 from acu_daemon.config import load_station, satellite_names
 from acu_daemon.control.plan import plan_pass
 from acu_daemon.edge.clock import SystemClock, is_clock_synchronised
@@ -21,6 +30,7 @@ from acu_daemon.edge.state import SNAPSHOT, state_directory, state_path
 from acu_daemon.errors import AcuDaemonError, LinkError, OrbitError, UsageError
 from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.timescales import utc_text
+from acu_daemon.orbit.visibility import why_none
 from acu_daemon.protocol.exchange import HostExchange
 from acu_daemon.protocol.messages import AcuMode, Command, Faults, Identify, Identity, Poll, ReadFaults, Reply, Status
 from acu_daemon.protocol.sa3842 import address_byte
@@ -159,28 +169,31 @@ def _satellite(config: Path, name: str, now_tai_s: float) -> Iterator[Finding]:
 def _next_pass(name: str, target: Target, now_tai_s: float) -> Iterator[Finding]:
     station = target.station
     lowest_deg = station.station.min_elevation_deg
-    passes = find_passes(target.elements.propagator, station.site, now_tai_s, now_tai_s + DAY_S, lowest_deg)
-    is_ephemeris = target.elements.propagator.kind == "oem"
+    propagator = target.elements.propagator
+    passes = find_passes(propagator, station.site, now_tai_s, now_tai_s + DAY_S, lowest_deg)
+    is_ephemeris = propagator.kind == "oem"
     if not passes:
         until = ending(target, now_tai_s + DAY_S)
-        text = f"none above {lowest_deg:g} deg within a day" + (until and f"; {until}")
-        yield Finding(NO_GO if until and not is_ephemeris else WARN, f"{name}: next pass", text)
+        why = "" if until else why_none(propagator, station.site, now_tai_s, now_tai_s + DAY_S, lowest_deg)
+        texts = [f"none above {lowest_deg:g} deg within a day", why, until]
+        verdict = NO_GO if until and not is_ephemeris else WARN
+        yield Finding(verdict, f"{name}: next pass", "; ".join(text for text in texts if text))
         return
     coming = passes[0]
     if lacking := not_covered(target, coming, now_tai_s):
         yield Finding(NO_GO, f"{name}: next pass", lacking)
         return
+    lasts = open_ends(coming, now_tai_s, now_tai_s + DAY_S) or f"{coming.duration_s / 60:.1f} min"
     yield Finding(
         GO,
         f"{name}: next pass",
-        f"{utc_text(coming.rise_tai_s, 0)}, {coming.duration_s / 60:.1f} min, up to "
-        f"{coming.culmination_el_deg:.1f} deg",
+        f"{utc_text(coming.rise_tai_s, 0)}, {lasts}, up to {coming.culmination_el_deg:.1f} deg",
     )
     if not is_ephemeris and (until := ending(target, now_tai_s + NEXT_PASS_DAYS * DAY_S)):
         yield Finding(WARN, f"{name}: decay", until)
     limits = station.acu.azimuth.limits()
     middle_deg = (limits.min_deg + limits.max_deg) / 2
-    plan = plan_pass(target.elements.propagator, station.site, coming, middle_deg, limits, coming.rise_tai_s)
+    plan = plan_pass(propagator, station.site, coming, middle_deg, limits, coming.rise_tai_s)
     if plan.note:
         yield Finding(WARN, f"{name}: cable wrap", plan.note)
     else:

@@ -134,7 +134,7 @@ def ending(target: Target, end_tai_s: float) -> str:
     if last_tai_s >= end_tai_s:
         return ""
     if isinstance(propagator, Sgp4Propagator):
-        return f"from {utc_text(last_tai_s, 0)} on the elements know nothing: {propagator.end_reason}"
+        return f"from {utc_text(last_tai_s, 0)} on nothing is known: by the elements {propagator.end_reason}"
     return f"the ephemeris ends at {utc_text(last_tai_s, 0)}"
 
 
@@ -177,6 +177,14 @@ def cut_passes(target: Target, passes: list[Pass]) -> list[str]:
         if one.set_tai_s in ends:
             said.append(f"{of} {what} ends within it")
     return said
+
+
+def open_ends(one: Pass, start_tai_s: float, end_tai_s: float) -> str:
+    """Say in words that a pass has no rise or no set; empty where it has both.  From and to: those of the search."""
+    has_no_rise, has_no_set = one.rise_tai_s == start_tai_s, one.set_tai_s == end_tai_s
+    if has_no_rise and has_no_set:
+        return "always up: does not set"
+    return "does not rise" if has_no_rise else "does not set" if has_no_set else ""
 
 
 def gaps(target: Target, start_tai_s: float, end_tai_s: float) -> list[str]:

@@ -1,21 +1,34 @@
 """`acu-daemon passes`: the coming passes."""
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 
-from acu_daemon.cli.options import Config, cut_passes, ending, gaps, load_target, parse_utc
-from acu_daemon.config import satellite_names
+from acu_daemon.cli.options import Config, cut_passes, ending, gaps, load_target, open_ends, parse_utc
+from acu_daemon.config import load_station, satellite_names
 from acu_daemon.edge.clock import SystemClock
-from acu_daemon.errors import OrbitError, UsageError
+from acu_daemon.errors import AcuDaemonError, OrbitError, UsageError
 from acu_daemon.model import Pass
 from acu_daemon.orbit.passes import find_passes
+from acu_daemon.orbit.propagator import spans_tai_s
 from acu_daemon.orbit.timescales import utc_text
+from acu_daemon.orbit.visibility import why_none
 from acu_daemon.units import DAY_S
 
 ROW = "{name:16} {rise:19}  {duration:>8}  {rise_az:>6}  {culmination:>6}  {culmination_az:>6}  {set_az:>6}"
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """A satellite's passes within a search, why there are none, and what there is to say of elements and search."""
+
+    passes: list[Pass]
+    why_none: str
+    said: list[str]
 
 
 def command(
@@ -27,24 +40,78 @@ def command(
         str | None, typer.Option("--from", metavar="UTC", help="Start of the search.  Default: now.")
     ] = None,
     days: Annotated[float, typer.Option("--days", metavar="N", min=0.01, max=60, help="Length of the search.")] = 1.0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print a JSON list, angles in degrees.")] = False,
+    as_json: Annotated[
+        bool,
+        typer.Option(
+            "--json",
+            help="Print a JSON list, angles in degrees; where satellites are left out, an object with the list as "
+            "`passes` and them, each with its reason, as `omitted`.",
+        ),
+    ] = False,
 ) -> None:
-    """Show the passes above the station's lowest elevation: rise, duration, culmination, set."""
+    """Show the passes above the station's lowest elevation: rise, duration, culmination, set.
+
+    A satellite whose files or elements cannot be used is left out with its reason, the others are shown; exit status 2
+    where none is left.
+    """
     start_tai_s = SystemClock().tai_s() if start is None else parse_utc("--from", start)
+    end_tai_s = start_tai_s + days * DAY_S
     names = [satellite] if satellite is not None else satellite_names(config)
     if not names:
         raise UsageError(f"{config}/satellites holds no satellite; put a NAME.toml there")
-    rows: list[tuple[str, Pass]] = []
+    load_station(config)  # what is wrong with it is no single satellite's
+    seen: dict[str, _Seen] = {}
+    omitted: dict[str, str] = {}
     for name in names:
         try:
-            rows += [(name, one) for one in _passes(config, name, start_tai_s, start_tai_s + days * DAY_S)]
-        except OrbitError as error:
-            if satellite is not None:
-                raise
-            typer.echo(f"warning: {name} is left out: {error}", err=True)
+            seen[name] = _search(config, name, start_tai_s, end_tai_s)
+        except AcuDaemonError as error:
+            omitted[name] = str(error)
+        else:
+            for text in seen[name].said:
+                typer.echo(text, err=True)
+    if len(names) > 1:
+        for name, reason in omitted.items():
+            typer.echo(f"warning: {name} is left out: {'; '.join(reason.splitlines())}", err=True)
+    _show(seen, omitted, start_tai_s, end_tai_s, as_json=as_json)
+    if not seen:
+        alone = next(iter(omitted.values()))
+        raise UsageError(alone if len(names) == 1 else f"no satellite of {config}/satellites can be used")
+
+
+def _search(config: Path, name: str, start_tai_s: float, end_tai_s: float) -> _Seen:
+    """One satellite's passes.  AcuDaemonError: its files or elements cannot be used."""
+    target = load_target(config, name, start_tai_s, is_strict=False)
+    propagator, site = target.elements.propagator, target.station.site
+    is_ephemeris = propagator.kind == "oem"
+    if not is_ephemeris and not any(
+        end >= start_tai_s and start <= end_tai_s for start, end in spans_tai_s(propagator)
+    ):
+        propagator.states_teme(np.array([start_tai_s]))  # says why it has none
+        raise OrbitError(f"{target.elements.label}: the search lies outside what is known of it")
+    said = [f"warning: {text}" for text in [*target.elements.errors, *target.elements.warnings]]
+    if target.elements.choice:
+        said.append(f"note: {target.elements.choice}")
+    if until := ending(target, end_tai_s):
+        said.append(f"warning: {name}: {until}, no pass is looked for after that")
+    lowest_deg = target.station.station.min_elevation_deg
+    found = find_passes(propagator, site, start_tai_s, end_tai_s, lowest_deg)
+    said += [f"warning: {name}: {text}" for text in gaps(target, start_tai_s, end_tai_s) + cut_passes(target, found)]
+    is_told = bool(found) or bool(until) or is_ephemeris
+    return _Seen(found, "" if is_told else why_none(propagator, site, start_tai_s, end_tai_s, lowest_deg), said)
+
+
+def _show(
+    seen: dict[str, _Seen], omitted: dict[str, str], start_tai_s: float, end_tai_s: float, *, as_json: bool
+) -> None:
+    rows = [(name, one) for name, of in seen.items() for one in of.passes]
     rows.sort(key=lambda row: row[1].rise_tai_s)
     if as_json:
-        typer.echo(json.dumps([_as_json(name, one) for name, one in rows], indent=1))
+        passes = [_as_json(name, one, start_tai_s, end_tai_s) for name, one in rows]
+        left_out = [{"satellite": name, "reason": reason} for name, reason in omitted.items()]
+        typer.echo(json.dumps({"passes": passes, "omitted": left_out} if omitted else passes, indent=1))
+        return
+    if not seen:
         return
     typer.echo(
         ROW.format(
@@ -58,22 +125,13 @@ def command(
         )
     )
     for name, one in rows:
-        typer.echo(_as_text(name, one))
-    if not rows:
+        typer.echo(f"{_as_text(name, one)}  {open_ends(one, start_tai_s, end_tai_s)}".rstrip())
+    for name, of in seen.items():
+        if of.why_none:
+            typer.echo(f"{name}: {of.why_none}")
+    if any(not of.why_none for of in seen.values()) and not rows:
+        days = (end_tai_s - start_tai_s) / DAY_S
         typer.echo(f"no pass within {days:g} days; try --days {min(60, 3 * days):g}")
-
-
-def _passes(config: Path, name: str, start_tai_s: float, end_tai_s: float) -> list[Pass]:
-    target = load_target(config, name, start_tai_s, is_strict=False)
-    for text in [*target.elements.errors, *target.elements.warnings]:
-        typer.echo(f"warning: {text}", err=True)
-    if until := ending(target, end_tai_s):
-        typer.echo(f"warning: {name}: {until}, no pass is looked for after that", err=True)
-    lowest_deg = target.station.station.min_elevation_deg
-    found = find_passes(target.elements.propagator, target.station.site, start_tai_s, end_tai_s, lowest_deg)
-    for text in [*gaps(target, start_tai_s, end_tai_s), *cut_passes(target, found)]:
-        typer.echo(f"warning: {name}: {text}", err=True)
-    return found
 
 
 def _as_text(name: str, one: Pass) -> str:
@@ -89,7 +147,7 @@ def _as_text(name: str, one: Pass) -> str:
     )
 
 
-def _as_json(name: str, one: Pass) -> dict[str, Any]:
+def _as_json(name: str, one: Pass, start_tai_s: float, end_tai_s: float) -> dict[str, Any]:
     return {
         "satellite": name,
         "rise_utc": utc_text(one.rise_tai_s),
@@ -100,4 +158,6 @@ def _as_json(name: str, one: Pass) -> dict[str, Any]:
         "culmination_az_deg": round(one.culmination_az_deg, 3),
         "culmination_el_deg": round(one.culmination_el_deg, 3),
         "set_az_deg": round(one.set_az_deg, 3),
+        "does_not_rise": one.rise_tai_s == start_tai_s,
+        "does_not_set": one.set_tai_s == end_tai_s,
     }

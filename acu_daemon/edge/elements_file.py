@@ -41,6 +41,7 @@ class LoadedElements:
     epoch_tai_s: float
     errors: list[str]
     warnings: list[str]
+    choice: str = ""  # which of several sets is used, and why
 
 
 def load_elements(
