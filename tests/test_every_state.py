@@ -1,0 +1,156 @@
+"""`full` with each of its states open, also those that are off by default: against a geometry of the test's own.
+
+What the encoders show is made from vectors here: the true place on the ellipsoid with the vertical and the north that
+belong to it, and the biases as docs and model.AngleBias define them.
+"""
+
+import numpy as np
+import pytest
+from made_orbits import EPOCH_TAI_S, circular, site, visible
+from real_passes import noisy, sky_angles_deg
+
+from acu_daemon.assist.encoder import encoder_look, sky_covariance
+from acu_daemon.assist.full import FullEstimator
+from acu_daemon.assist.full_states import STATE_COUNT, bias_of, correction_of, make_prior, shift_of, states_of
+from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings
+from acu_daemon.model import Readings
+from acu_daemon.orbit.frames import itrs_from_teme
+from acu_daemon.units import DEG
+
+EQUATOR_M, FLATTENING = 6378137.0, 1.0 / 298.257223563  # WGS 84
+E2 = FLATTENING * (2.0 - FLATTENING)
+SOURCE, GIVEN = circular(66.0, 0.01), site(5.0, 20.0)
+NOISE_DEG = 0.03
+ORBIT_SIGMAS = {
+    "raan_deg": 0.05,
+    "mean_anomaly_deg": 0.3,
+    "mean_motion_rad_min": 2e-5,
+    "e_vector": 2e-4,
+    "inclination_deg": 0.05,
+}
+BIAS_SIGMAS = {
+    "bias_sigma_azimuth_deg": 0.11,
+    "bias_sigma_azimuth_sec_deg": 0.07,
+    "bias_sigma_elevation_deg": 0.13,
+    "bias_sigma_elevation_cot_deg": 0.05,
+}
+STATION_SIGMA_M = 2000.0
+ORBIT = (0.05 * DEG, 0.3 * DEG, 2e-5 / 60.0, 2e-4, 2e-4, 0.05 * DEG)
+BIASES = (0.11 * DEG, 0.07 * DEG, 0.13 * DEG, 0.05 * DEG)
+STATION_M = (2000.0, 2000.0, 200.0)  # heights are known ten times as well as places
+SIGMAS = np.array([*ORBIT, *BIASES, *STATION_M])  # in the order of assist.full_states
+NAMES = (
+    *("raan", "mean anomaly", "mean motion", "e cos argp", "e sin argp", "inclination"),
+    *("azimuth", "azimuth / cos h", "elevation", "elevation x cot h", "east", "north", "up"),
+)
+OF_NAME = ("raan_deg", "mean_anomaly_deg", "mean_motion_rad_min", "e_vector", "e_vector", "inclination_deg")
+
+
+def settings(states) -> EstimatorSettings:
+    """Only these states may move."""
+    orbit = {OF_NAME[k]: ORBIT_SIGMAS[OF_NAME[k]] for k in states if k < 6}
+    closed = dict.fromkeys(ElementSigmas.__dataclass_fields__, 0.0)
+    biases = {name: sigma if 6 + i in states else 0.0 for i, (name, sigma) in enumerate(BIAS_SIGMAS.items())}
+    station_m = STATION_SIGMA_M if {10, 11, 12} & set(states) else 0.0
+    sigmas = ElementSigmas(**closed | orbit)
+    return EstimatorSettings(NOISE_DEG, NOISE_DEG, orbit_sigmas=sigmas, station_sigma_m=station_m, **biases)
+
+
+def place(latitude_deg, longitude_deg, height_m):
+    """Earth-fixed position, and axes east, north, up as rows."""
+    lat, lon = latitude_deg * DEG, longitude_deg * DEG
+    radius_m = EQUATOR_M / np.sqrt(1.0 - E2 * np.sin(lat) ** 2)
+    up = np.array([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)])
+    east = np.array([-np.sin(lon), np.cos(lon), 0.0])
+    at_m = (radius_m + height_m) * up - np.array([0.0, 0.0, E2 * radius_m * np.sin(lat)])
+    return at_m, np.array([east, np.cross(up, east), up])
+
+
+def geodetic(at_m):
+    """Latitude, longitude and height of an Earth-fixed position, by iteration."""
+    x, y, z = at_m
+    flat, lat = np.hypot(x, y), np.arctan2(z, np.hypot(x, y))
+    for _ in range(10):
+        radius_m = EQUATOR_M / np.sqrt(1.0 - E2 * np.sin(lat) ** 2)
+        height_m = flat / np.cos(lat) - radius_m
+        lat = np.arctan2(z, flat * (1.0 - E2 * radius_m / (radius_m + height_m)))
+    return lat / DEG, np.arctan2(y, x) / DEG, height_m
+
+
+def shown(x, tai_s):
+    """What the encoders show of the truth with the states x: azimuth and elevation, degrees."""
+    station = GIVEN.station
+    at_m, axes = place(station.latitude_deg, station.longitude_deg, station.height_m)
+    at_m, axes = place(*geodetic(at_m + axes.T @ x[10:]))
+    r_m, v_m_s = SOURCE.corrected(correction_of(x)).states_teme(tai_s)
+    east, north, up = axes @ (itrs_from_teme(r_m, v_m_s, tai_s, GIVEN.orientation)[0] - at_m).T
+    el = np.arctan2(up, np.hypot(east, north))
+    az_deg = np.arctan2(east, north) / DEG + (x[6] + x[7] / np.cos(el)) / DEG
+    return az_deg % 360.0, (el + x[8] + x[9] / np.tan(el)) / DEG
+
+
+def fit_of(readings, chosen):
+    estimator = FullEstimator(SOURCE, GIVEN, chosen)
+    estimator.add(readings)
+    fit = estimator.fit()
+    assert fit is not None
+    return fit
+
+
+def found_of(fit):
+    return states_of(fit.correction, fit.bias, fit.station_shift_enu_m)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("state", range(STATE_COUNT), ids=NAMES)
+def test_a_state_that_alone_is_open_is_found_with_its_sign_and_goes_into_the_prediction(state: int, sign: float):
+    x = np.zeros(STATE_COUNT)
+    x[state] = sign * SIGMAS[state]
+    tai_s = visible(SOURCE, GIVEN, 1.0)
+    az_deg, el_deg = shown(x, tai_s)
+    assert el_deg.min() < 7.0
+    assert el_deg.max() > 60.0
+    fit = fit_of(Readings(tai_s, az_deg, el_deg), settings({state}))
+    found = found_of(fit)
+    others = [k for k in range(STATE_COUNT) if k != state]
+    assert found[state] == pytest.approx(x[state], rel=0.05)
+    assert np.abs(found[others] / SIGMAS[others]).max() < 0.05
+    seen = encoder_look(SOURCE.corrected(fit.correction), tai_s, GIVEN, fit)
+    assert sky_angles_deg(seen.az_deg, seen.el_deg, az_deg, el_deg).max() < 0.002
+
+
+def test_every_sigma_goes_to_its_own_state():
+    covariance = make_prior(SOURCE, settings(range(STATE_COUNT)), EPOCH_TAI_S).covariance
+    assert np.allclose(np.sqrt(np.diag(covariance)), SIGMAS, rtol=1e-9)
+    assert np.count_nonzero(covariance) == STATE_COUNT
+
+
+def test_states_are_taken_apart_and_put_together_in_one_order():
+    x = np.arange(1.0, STATE_COUNT + 1.0)
+    assert np.allclose(states_of(correction_of(x), bias_of(x), shift_of(x)), x)
+    bias, shift_m = bias_of(x), shift_of(x)
+    assert np.allclose(np.array([bias.az_deg, bias.az_sec_deg, bias.el_deg, bias.el_cot_deg]) * DEG, x[6:10])
+    assert shift_m == (11.0, 12.0, 13.0)
+
+
+def test_with_every_state_open_the_covariance_tells_the_errors_of_the_prediction():
+    """Truths drawn from the prior; half a pass of readings; errors of the other half in their own sigmas."""
+    chosen, squares, states = settings(range(STATE_COUNT)), [], []
+    tai_s = visible(SOURCE, GIVEN, 3.0)
+    half = tai_s.size // 2
+    for run in range(25):
+        rng = np.random.default_rng(run)
+        x = SIGMAS * rng.normal(size=STATE_COUNT)
+        az_deg, el_deg = shown(x, tai_s)
+        fit = fit_of(noisy(az_deg[:half], el_deg[:half], tai_s[:half], NOISE_DEG, rng), chosen)
+        corrected = SOURCE.corrected(fit.correction)
+        seen = encoder_look(corrected, tai_s[half:], GIVEN, fit)
+        across, both, upward = sky_covariance(corrected, tai_s[half:], GIVEN, fit)
+        right = ((az_deg[half:] - seen.az_deg + 180.0) % 360.0 - 180.0) * np.cos(seen.el_deg * DEG) * DEG
+        up = (el_deg[half:] - seen.el_deg) * DEG
+        chi2 = (right**2 * upward - 2.0 * right * up * both + up**2 * across) / (across * upward - both**2)
+        squares.append(float(np.mean(chi2)))
+        states.append((found_of(fit) - x) / np.sqrt(np.diag(fit.covariance)))
+    assert 1.0 < np.mean(squares) < 3.0  # two components
+    rms = np.sqrt(np.mean(np.square(states), axis=0))
+    assert ((rms > 0.6) & (rms < 1.5)).all(), dict(zip(NAMES, rms.round(2).tolist(), strict=True))
