@@ -1,0 +1,58 @@
+"""Profiles that point at one place on the ground, as polynomials: pieces are halved until they follow it."""
+
+import numpy as np
+
+from acu_daemon.onboard.frames import Gimbal, gimbal_angles
+from acu_daemon.onboard.least_path import nearest_path
+from acu_daemon.onboard.profile import Method, Profile, Task
+from acu_daemon.onboard.quintic import Indices, Knots, Path
+from acu_daemon.onboard.view import PER_PLAN_STEP
+from acu_daemon.units import DEG, Array
+
+FIRST_PIECE_S, SHORTEST_PIECE_S = 20.0, 0.3
+FOLLOWS_DEG = 0.005  # on the sky
+_SPARSE_PIECE_S = 4.0  # longer pieces are fitted at a quarter of a second
+
+
+def pointed_profile(task: Task, target_itrs_m: Array, method: Method) -> Profile:
+    """Follow a point (3,) of the Earth with an aligned beam, free of the drive's limits."""
+    wanted = gimbal_angles(task.view.vectors_m(target_itrs_m))
+    azimuth, elevation = fit(task.view.time_s, wanted)
+    return Profile(method, azimuth, elevation)
+
+
+def fit(
+    time_s: Array, wanted: Gimbal, first_piece_s: float = FIRST_PIECE_S, follows_deg: float = FOLLOWS_DEG
+) -> tuple[Path, Path]:
+    """Polynomials through sampled angles (N,), on pieces of their own need, the same for both."""
+    count = max(1, int(np.ceil(time_s[-1] / first_piece_s)))
+    knots = Knots(np.linspace(0.0, time_s[-1], count + 1))
+    across = np.sin(wanted.el_deg * DEG)
+    while True:
+        used = _samples(time_s, knots)
+        paths = [_nearest(time_s[used], angle[used], knots) for angle in (wanted.az_deg, wanted.el_deg)]
+        az_error, el_error = (
+            path.value(time_s) - angle for path, angle in zip(paths, (wanted.az_deg, wanted.el_deg), strict=True)
+        )
+        error = np.hypot(az_error * across, el_error)
+        worst = np.maximum.reduceat(error, np.searchsorted(time_s, knots.time_s[:-1]))
+        is_off = (worst > follows_deg) & (knots.length_s > 2.0 * SHORTEST_PIECE_S)
+        if not is_off.any():
+            return paths[0], paths[1]
+        halves = (knots.time_s[:-1] + knots.length_s / 2.0)[is_off]
+        knots = Knots(np.sort(np.concatenate([knots.time_s, halves])))
+
+
+def _nearest(time_s: Array, angle_deg: Array, knots: Knots) -> Path:
+    path = nearest_path(time_s, angle_deg, knots, np.inf, np.inf)
+    if path is None:
+        raise ValueError("least squares without bounds always have an answer")
+    return path
+
+
+def _samples(time_s: Array, knots: Knots) -> Indices:
+    """All samples of short pieces, every fifth of long ones."""
+    index = np.arange(time_s.size)
+    is_short = knots.length_s[knots.piece_of(time_s)] < _SPARSE_PIECE_S
+    used: Indices = index[is_short | (index % PER_PLAN_STEP == 0)]
+    return used
