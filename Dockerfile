@@ -1,4 +1,6 @@
 FROM python:3.11-slim
+# An init: the first process of a container gets no signal that it has no handler for, not even the stop.
+RUN apt-get update && apt-get install -y --no-install-recommends tini && rm -rf /var/lib/apt/lists/*
 RUN useradd --system --create-home --home-dir /var/lib/acu-daemon --groups dialout acu
 WORKDIR /opt/acu-daemon
 COPY pyproject.toml constraints.txt README.md LICENSE ./
@@ -9,5 +11,5 @@ ENV STATE_DIRECTORY=/var/lib/acu-daemon
 VOLUME ["/etc/acu-daemon"]
 # Healthy: the daemon in this container has ticked within the last seconds.
 HEALTHCHECK --interval=30s --timeout=10s CMD ["acu-daemon", "check", "--config", "/etc/acu-daemon", "--running"]
-ENTRYPOINT ["acu-daemon"]
+ENTRYPOINT ["tini", "--", "acu-daemon"]
 CMD ["--help"]

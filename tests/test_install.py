@@ -117,4 +117,7 @@ def test_the_health_check_is_a_command_that_exists_and_finds_no_daemon_here(inst
 
 def test_the_image_starts_the_installed_entry_point(installed: Installed) -> None:
     (entry,), (default,) = instructions("ENTRYPOINT"), instructions("CMD")
-    assert installed.run(*json.loads(entry), *json.loads(default)).returncode == 0
+    *init, command = json.loads(entry)
+    assert init == ["tini", "--"]  # a first process without handlers loses every signal
+    assert any("apt-get install" in line and "tini" in line.split() for line in instructions("RUN"))
+    assert installed.run(command, *json.loads(default)).returncode == 0

@@ -25,7 +25,7 @@ from acu_daemon.config import load_station, satellite_names
 from acu_daemon.control.plan import plan_pass
 from acu_daemon.edge.clock import SystemClock, is_clock_synchronised
 from acu_daemon.edge.latch import ADVICE, DISARMED, LATCH
-from acu_daemon.edge.link import check_rate, make_link
+from acu_daemon.edge.link import check_rate, make_link, open_once
 from acu_daemon.edge.state import SNAPSHOT, state_directory, state_path
 from acu_daemon.errors import AcuDaemonError, LinkError, OrbitError, UsageError
 from acu_daemon.orbit.passes import find_passes
@@ -219,7 +219,7 @@ async def _acu(url: str, address: int) -> list[Finding]:
             return None
 
     try:
-        await link.open()
+        await open_once(link)
         status = await ask(Poll())
         if not isinstance(status, Status):
             why = f"{link.description} is open, but no ACU answers: check address and baud rate"

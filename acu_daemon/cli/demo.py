@@ -16,16 +16,18 @@ from typing import Annotated, Any
 import structlog
 import typer
 
-from acu_daemon.cli.options import STOP_SIGNALS, Target, coming_pass, load_target
+from acu_daemon.cli.options import Target, coming_pass, load_target
 from acu_daemon.cli.run import make_job
 from acu_daemon.daemon.live import LiveLine
 from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.daemon.snapshot import Snapshot
+from acu_daemon.edge.child_process import start_python
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.fit import ProcessFitRunner
 from acu_daemon.edge.link import make_link
-from acu_daemon.edge.logs import configure_logs
+from acu_daemon.edge.logs import configure_logs, tell_signal
 from acu_daemon.edge.recording import RecordingWriter
+from acu_daemon.edge.signals import take_signals
 from acu_daemon.errors import AcuDaemonError, UsageError
 from acu_daemon.model import sky_angle_deg
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
@@ -125,9 +127,7 @@ async def _fake_acu(config: Path, at_monotonic_s: float, trace: Path) -> AsyncIt
     arguments = ["--config", str(config), "--satellite", SATELLITE, "--listen", "127.0.0.1:0", "--seed", str(SEED)]
     arguments += ["--at", START_UTC, "--at-monotonic", str(at_monotonic_s), "--trace", str(trace)]
     arguments += ["--scenario", str(config / "scenario.toml")]
-    process = await asyncio.create_subprocess_exec(
-        sys.executable,
-        "-m",
+    process = await start_python(
         "acu_daemon",
         "fake-acu",
         *arguments,
@@ -170,8 +170,7 @@ async def _assisted(config: Path, url: str, clock: SystemClock, sky: Sky, record
 
     with RecordingWriter(recording_path) as recording:
         service = Service(job, link, clock, ProcessFitRunner(job.refit), on_snapshot=show, on_reading=recording.add)
-        for number in STOP_SIGNALS:
-            asyncio.get_running_loop().add_signal_handler(number, service.stop, number.name)
+        take_signals(asyncio.get_running_loop(), service.stop, tell_signal)
         try:
             return await service.run()
         finally:

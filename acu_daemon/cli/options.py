@@ -1,7 +1,6 @@
 """Options that several commands share, and what they are turned into."""
 
 import math
-import signal
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -26,7 +25,6 @@ from acu_daemon.units import DAY_S
 
 NEXT_PASS_DAYS = 3.0
 SOON_S = 1800.0  # a pass that is over by then is looked for first: a restart in mid-pass is in a hurry
-STOP_SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)  # a closed terminal stops safely too
 SPARE_S = 30.0  # what a buffer and a fit look at beyond the times they are for, with some to spare
 
 Config = Annotated[

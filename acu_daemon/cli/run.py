@@ -20,7 +20,6 @@ from acu_daemon import PROCESS_START_S
 from acu_daemon.assist.carry_over import CarryOver
 from acu_daemon.cli.kept import Kept, open_kept
 from acu_daemon.cli.options import (
-    STOP_SIGNALS,
     At,
     AtMonotonic,
     Config,
@@ -42,9 +41,10 @@ from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.control_socket import ControlSocket
 from acu_daemon.edge.fit import ProcessFitRunner
 from acu_daemon.edge.link import Link, check_rate, make_link
-from acu_daemon.edge.logs import configure_logs, tell_dropped
+from acu_daemon.edge.logs import configure_logs, tell_dropped, tell_signal
 from acu_daemon.edge.recording import RecordingWriter
 from acu_daemon.edge.scheduling import keep_to_this_thread, scheduling_text
+from acu_daemon.edge.signals import STOPS, take_signals
 from acu_daemon.edge.state import SnapshotFile, state_directory
 from acu_daemon.edge.systemd import Notifier
 from acu_daemon.edge.writer import QueuedStream, Writer
@@ -137,11 +137,7 @@ def command(
         structlog.get_logger("run").info("run.done", **asdict(outcome))
     if not outcome.is_stopped:
         raise typer.Exit(1)
-    if (
-        outcome.has_begun
-        and not outcome.has_acquired
-        and outcome.reason not in {number.name for number in STOP_SIGNALS}
-    ):
+    if outcome.has_begun and not outcome.has_acquired and outcome.reason not in {number.name for number in STOPS}:
         raise typer.Exit(1)
 
 
@@ -240,9 +236,10 @@ async def _run(
         on_end=lambda: notifier("STOPPING=1"),  # no tick feeds the watchdog from here on: it lets the daemon stop
         files_alarm=files_alarm,
     )
-    loop = asyncio.get_running_loop()
-    for number in STOP_SIGNALS:
-        loop.add_signal_handler(number, service.stop, number.name)
+    ignored = take_signals(asyncio.get_running_loop(), service.stop, tell_signal)
+    if ignored:
+        reason = "whoever started this daemon ignores them, as nohup does"
+        structlog.get_logger("run").info("signals.ignored", signals=ignored, reason=reason)
     control = ControlSocket(directory, service.answer)
     await control.open()
     gc.freeze()  # a full collection over the start-up heap would stall a tick by tens of milliseconds

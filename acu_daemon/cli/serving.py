@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from acu_daemon.cli.options import STOP_SIGNALS
+from acu_daemon.edge.signals import take_signals
 from acu_daemon.errors import UsageError
 from acu_daemon.sim.fault_board import FaultBoard
 from acu_daemon.sim.fault_control import serve_control
@@ -62,8 +62,7 @@ async def serve_until_stopped(
 ) -> None:
     """Serve, say where, and end on a signal; beside: what runs meanwhile.  UsageError: a fault that cannot be had."""
     stopped = asyncio.Event()
-    for number in STOP_SIGNALS:
-        asyncio.get_running_loop().add_signal_handler(number, stopped.set)
+    take_signals(asyncio.get_running_loop(), stop=lambda _: stopped.set(), told=lambda _: None)
     async with contextlib.AsyncExitStack() as servers:
         if place.pty is not None:
             where = await servers.enter_async_context(serve_pty(make_peer, board, place.pty, place.baud))

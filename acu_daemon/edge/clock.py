@@ -1,6 +1,7 @@
 """The clocks: CLOCK_MONOTONIC for intervals, TAI through one slowly followed offset for the sky (design section 5)."""
 
 import asyncio
+import contextlib
 import ctypes
 import math
 import os
@@ -8,6 +9,7 @@ import subprocess
 import time
 from typing import Protocol
 
+from acu_daemon.edge.child_process import start
 from acu_daemon.orbit.timescales import tai_from_unix
 
 STEP_S = 0.1  # a jump of the system clock larger than this is reported and not obeyed
@@ -19,6 +21,8 @@ _TIMER_ABSOLUTE = 1
 _TIME_ERROR = 5  # adjtimex: the clock is not synchronised
 _TIMEX_BYTES = 512  # more than struct timex; all zero asks and sets nothing
 _ASK_SYSTEMD = ("timedatectl", "show", "--property=NTPSynchronized", "--value")
+_SYSTEMD_SAYS = {"yes": True, "no": False}
+SYSTEMD_S = 1.0
 _NONBLOCK_CLOEXEC = os.O_NONBLOCK | os.O_CLOEXEC
 
 
@@ -92,6 +96,7 @@ class SystemClock:
         else:
             self._offset_s = at_tai_s - (time.monotonic() if at_monotonic_s is None else at_monotonic_s)
         self._timer: Timerfd | None = None
+        self._is_timer_denied = False
 
     def monotonic_s(self) -> float:
         return time.monotonic()
@@ -108,9 +113,15 @@ class SystemClock:
         return difference_s
 
     async def sleep_until(self, tai_s: float) -> None:
+        if self._timer is None and not self._is_timer_denied:
+            try:
+                self._timer = Timerfd()
+            except OSError:
+                self._is_timer_denied = True  # asyncio's own is good for 0.6 ms
         if self._timer is None:
-            self._timer = Timerfd()
-        await self._timer.sleep_until(tai_s - self._offset_s)
+            await asyncio.sleep(max(0.0, tai_s - self.tai_s()))
+        else:
+            await self._timer.sleep_until(tai_s - self._offset_s)
 
     def close(self) -> None:
         if self._timer is not None:
@@ -120,7 +131,7 @@ class SystemClock:
     async def watch_synchronisation(self) -> None:
         """Ask now and then whether the system clock is synchronised, beside the loop: the answer may take a second."""
         while not self.is_rehearsal:
-            self.is_synchronised = await asyncio.to_thread(is_clock_synchronised)
+            self.is_synchronised = await _watched_synchronisation()
             await asyncio.sleep(ASK_EVERY_S)
 
 
@@ -165,11 +176,36 @@ def is_clock_synchronised() -> bool | None:
 
     A hardened service may not ask the kernel; systemd then answers for it, within a second.  None: nobody could tell.
     """
-    status = _LIBC.adjtimex(ctypes.create_string_buffer(_TIMEX_BYTES))
-    if status >= 0:
-        return bool(status != _TIME_ERROR)
+    if (said := _kernel_says()) is not None:
+        return said
     try:
-        asked = subprocess.run(_ASK_SYSTEMD, capture_output=True, text=True, timeout=1.0, check=False)
+        asked = subprocess.run(_ASK_SYSTEMD, capture_output=True, text=True, timeout=SYSTEMD_S, check=False)
     except (OSError, subprocess.TimeoutExpired):
         return None
-    return {"yes": True, "no": False}.get(asked.stdout.strip())
+    return _SYSTEMD_SAYS.get(asked.stdout.strip())
+
+
+async def _watched_synchronisation() -> bool | None:
+    """The same beside the loop, without a thread."""
+    if (said := _kernel_says()) is not None:
+        return said
+    try:
+        asked = await start(*_ASK_SYSTEMD, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.DEVNULL)
+    except OSError:
+        return None
+    try:
+        async with asyncio.timeout(SYSTEMD_S):
+            answer, _ = await asked.communicate()
+    except TimeoutError:
+        return None
+    finally:
+        if asked.returncode is None:
+            with contextlib.suppress(ProcessLookupError):
+                asked.kill()
+            await asked.wait()
+    return _SYSTEMD_SAYS.get(answer.decode("ascii", "replace").strip())
+
+
+def _kernel_says() -> bool | None:
+    status = _LIBC.adjtimex(ctypes.create_string_buffer(_TIMEX_BYTES))
+    return bool(status != _TIME_ERROR) if status >= 0 else None

@@ -6,18 +6,22 @@ The foreground never waits for it; a child that dies or hangs is replaced and gi
 import asyncio
 import contextlib
 import pickle
-import sys
+import signal
+from collections import deque
 from dataclasses import replace
 from typing import Any, Protocol
 
 import structlog
 
 from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup, Refitter
+from acu_daemon.edge.child_process import start_python
 from acu_daemon.edge.fit_child import LENGTH
 from acu_daemon.errors import AcuDaemonError
 from acu_daemon.model import Readings
 
 START_S = 20.0  # a child that starts may take this much longer: niced, on a busy machine, it loads numpy first
+END_S = 1.0  # a child that has closed its pipe has ended, or will within this
+SAID_LINES = 30  # of a child's standard error, such as a traceback, that the log takes
 
 
 class FitFailedError(AcuDaemonError):
@@ -60,6 +64,8 @@ class ProcessFitRunner:
         self._timeout_s = timeout_s
         self._child: asyncio.subprocess.Process | None = None
         self._given: list[Readings] = []
+        self._said: deque[str] = deque(maxlen=SAID_LINES)
+        self._hearing: asyncio.Task[None] | None = None
         self.start_count = 0
 
     async def refit(self, request: RefitRequest) -> RefitReply:
@@ -81,8 +87,11 @@ class ProcessFitRunner:
             await self.close()
             raise FitDiedError(f"the fit process gave no answer within {timeout_s:g} s") from None
         except (OSError, asyncio.IncompleteReadError) as error:
-            await self.close()
-            raise FitDiedError(f"the fit process died: {error}") from None
+            try:
+                why = await self._why_ended(error)
+            finally:
+                await self.close()
+            raise FitDiedError(why) from None
         except BaseException:
             await self.close()  # cancelled in mid-answer: what the child still says must not meet the next question
             raise
@@ -96,17 +105,42 @@ class ProcessFitRunner:
         return self._child.pid if self._child else None
 
     async def _start(self) -> None:
-        self._child = await asyncio.create_subprocess_exec(
-            sys.executable,
-            "-m",
+        self._child = await start_python(
             "acu_daemon.edge.fit_child",
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE,
             process_group=0,  # a Ctrl-C is for the daemon; a session of its own would not heed how nice it is
             limit=2**22,
         )
+        self._said.clear()
+        self._hearing = asyncio.create_task(self._hear(self._child), name="fit process said")
         self.start_count += 1
         await self._send(self._setup)
+
+    async def _hear(self, child: asyncio.subprocess.Process) -> None:
+        """Take what the child says on standard error to the log, the first lines of it."""
+        log: Any = structlog.get_logger("fit")
+        line_count = 0
+        while child.stderr is not None and (line := await child.stderr.readline()):
+            text = line.decode("utf-8", "backslashreplace").rstrip()
+            self._said.append(text)
+            line_count += 1
+            if line_count <= SAID_LINES:
+                log.warning("fit.process_said", text=text)
+
+    async def _why_ended(self, error: OSError | asyncio.IncompleteReadError) -> str:
+        """Why there is no answer: how the child ended, and its last words."""
+        child = self._child
+        if child is None:
+            return f"the fit process cannot be started: {getattr(error, 'strerror', None) or error}"
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(END_S):
+                await child.wait()
+                if self._hearing is not None:
+                    await self._hearing
+        said = next((text for text in reversed(self._said) if text), str(error))
+        return f"the fit process died ({_ending(child.returncode)}): {said}"
 
     async def _send(self, message: object) -> None:
         if self._child is None or self._child.stdin is None:
@@ -123,7 +157,7 @@ class ProcessFitRunner:
         try:
             return pickle.loads(data)
         except Exception as error:  # noqa: BLE001  of bytes that are no pickle anything may come
-            raise OSError(f"its answer makes no sense: {error}") from None
+            raise FitDiedError(f"the fit process died: its answer makes no sense: {error}") from None
 
     async def close(self) -> None:
         """End the child."""
@@ -134,6 +168,16 @@ class ProcessFitRunner:
             with contextlib.suppress(ProcessLookupError):
                 child.kill()
         await child.wait()
+        hearing, self._hearing = self._hearing, None
+        if hearing is not None:
+            hearing.cancel()
+            await asyncio.wait({hearing})
+
+
+def _ending(code: int | None) -> str:
+    if code is None:
+        return "it has closed its output"
+    return f"exit status {code}" if code >= 0 else signal.Signals(-code).name
 
 
 def _with_readings(request: RefitRequest, given: list[Readings]) -> RefitRequest:

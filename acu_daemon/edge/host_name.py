@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import ipaddress
 import socket
 import threading
 
@@ -9,26 +10,46 @@ PATIENCE_S = 0.5  # then the addresses known from before are used: with the netw
 
 
 class HostName:
-    """One lookup at a time, in a thread that no exit waits for, as it would for one of the loop's own."""
+    """One lookup at a time, in a thread that no exit waits for, as it would for one of the loop's own.
+
+    An address needs neither lookup nor thread.
+    """
 
     def __init__(self, host: str) -> None:
         self._host = host
         self._known: list[str] = []
+        with contextlib.suppress(ValueError):
+            self._known = [str(ipaddress.ip_address(host))]
+        self._is_address = bool(self._known)
         self._lookup: asyncio.Future[list[str] | OSError] | None = None
 
     async def addresses(self) -> list[str]:
         """The addresses, the best one first.  OSError: none is known."""
-        if self._lookup is None:
-            self._lookup = asyncio.get_running_loop().create_future()
-            threading.Thread(target=self._look_up, args=(self._lookup,), name="host name", daemon=True).start()
-        await asyncio.wait({self._lookup}, timeout=PATIENCE_S if self._known else None)
-        if self._lookup.done():
-            found, self._lookup = self._lookup.result(), None
+        if self._is_address:
+            return self._known
+        lookup = self._lookup or self._begin()
+        if lookup is None:
+            return self._known
+        await asyncio.wait({lookup}, timeout=PATIENCE_S if self._known else None)
+        if lookup.done():
+            found, self._lookup = lookup.result(), None
             if isinstance(found, list):
                 self._known = found
             elif not self._known:
                 raise found
         return self._known
+
+    def _begin(self) -> "asyncio.Future[list[str] | OSError] | None":
+        """Begin a lookup.  None: the system denies a thread for it, and addresses are known.  OSError: none are."""
+        lookup: asyncio.Future[list[str] | OSError] = asyncio.get_running_loop().create_future()
+        try:
+            threading.Thread(target=self._look_up, args=(lookup,), name="host name", daemon=True).start()
+        except RuntimeError as error:
+            if self._known:
+                return None
+            raise OSError(f"{self._host!r} cannot be looked up: {error}") from None
+        self._lookup = lookup
+        return lookup
 
     def _look_up(self, lookup: "asyncio.Future[list[str] | OSError]") -> None:
         found: list[str] | OSError

@@ -8,7 +8,7 @@ from urllib.parse import SplitResult, parse_qsl, urlsplit
 
 from acu_daemon.edge.serial_port import CHARACTER_FORMATS, SerialLink
 from acu_daemon.edge.tcp import TcpLink
-from acu_daemon.errors import UsageError
+from acu_daemon.errors import LinkError, UsageError
 from acu_daemon.protocol.messages import WriteAndPoll
 from acu_daemon.protocol.sa3842 import cycle_s, exchange_bytes
 
@@ -65,6 +65,18 @@ def make_link(url: str, monotonic: Callable[[], float] = time.monotonic) -> Link
             raise UsageError(f"link {url!r}: format {character_format!r}, expected 8N1 or 7E1")
         return SerialLink(parts.path, _baud(url, options.get("baud", str(DEFAULT_BAUD))), character_format, monotonic)
     raise UsageError(f"link {url!r} is not understood; {EXPECTED}")
+
+
+async def open_once(link: Link) -> None:
+    """Open a link without the patience of a daemon: every address of its name has its try.  LinkError: none answers."""
+    try_count = 0
+    while True:
+        try_count += 1
+        try:
+            return await link.open()
+        except LinkError:
+            if not isinstance(link, TcpLink) or try_count >= link.address_count:
+                raise
 
 
 def check_rate(link: Link, period_s: float, device_delay_s: float) -> None:

@@ -52,6 +52,12 @@ def tell_dropped(count: int) -> None:
     structlog.get_logger("log").warning("log.dropped", count=count, reason="the log's reader did not keep up")
 
 
+def tell_signal(name: str) -> None:
+    """Say that a signal came which means nothing here."""
+    log: Any = structlog.get_logger("run")
+    log.warning("signal.ignored", signal=name, advice="`acu-daemon status` asks, `disarm` and SIGTERM stop")
+
+
 class _Output:
     """Prints lines to standard output.  A reader that went away, or a full disk, costs the line and never the pass."""
 

@@ -26,36 +26,62 @@ class TcpLink:
         baud = f"?baud={round(10.0 / byte_time_s)}" if byte_time_s else ""
         self.description = f"tcp://{f'[{host}]' if ':' in host else host}:{port}{baud}"
         self._connection: _Connection | None = None
+        self._first = 0  # of the addresses: where the next attempt begins
+        self.address_count = 1
 
     async def open(self) -> None:
-        """Connect.  LinkRefusedError: nobody listens; LinkError: no way there."""
+        """Connect.  LinkRefusedError: nobody listens; LinkError: no way there.
+
+        The addresses of the host are tried in their order.  One that does not answer ends the attempt, so that none
+        takes longer than the service's watchdog waits, and the next attempt begins with the address after it.
+        """
         try:
             async with asyncio.timeout(CONNECT_TIMEOUT_S):
-                self._connection = await self._connect()
+                addresses = await self._name.addresses()
         except TimeoutError:
             raise LinkError(
-                f"{self.description} does not answer within {CONNECT_TIMEOUT_S:g} s: "
-                "check the address, that the ACU is on, and that no firewall drops the connection"
-            ) from None
-        except ConnectionRefusedError:
-            raise LinkRefusedError(
-                f"nobody listens at {self.description}: check the port, and that the ACU or the simulator is on"
+                f"{self.description}: its name server does not answer within {CONNECT_TIMEOUT_S:g} s"
             ) from None
         except OSError as error:
-            raise LinkError(f"{self.description} cannot be reached: {error.strerror or error}") from None
+            raise self._unreachable(error) from None
+        self.address_count = len(addresses)
+        self._connection = await self._connect(addresses)
 
-    async def _connect(self) -> "_Connection":
-        """Try the addresses of the host, in their order; the last one says why none answers."""
+    async def _connect(self, addresses: list[str]) -> "_Connection":
         loop, refused = asyncio.get_running_loop(), OSError("the host has no address")
         make = partial(_Connection, self.description, self._monotonic)
-        for address in await self._name.addresses():
+        first = self._first % max(1, len(addresses))
+        for index, address in enumerate(addresses[first:] + addresses[:first], first):
+            self._first = index
             try:
-                _, connection = await loop.create_connection(make, address, self._port)
+                async with asyncio.timeout(CONNECT_TIMEOUT_S):
+                    _, connection = await loop.create_connection(make, address, self._port)
+            except TimeoutError:
+                self._first = index + 1
+                raise self._unanswered(address, len(addresses)) from None
             except OSError as error:
                 refused = error
+            except RuntimeError as error:  # an address with a scope is looked up in a thread
+                refused = OSError(str(error))
             else:
                 return connection
-        raise refused
+        raise self._unreachable(refused)
+
+    def _unanswered(self, address: str, address_count: int) -> LinkError:
+        others = (
+            f" at {address}; its name has {address_count} addresses, the next is tried" if address_count > 1 else ""
+        )
+        return LinkError(
+            f"{self.description} does not answer within {CONNECT_TIMEOUT_S:g} s{others}: "
+            "check the address, that the ACU is on, and that no firewall drops the connection"
+        )
+
+    def _unreachable(self, error: OSError) -> LinkError:
+        if isinstance(error, ConnectionRefusedError):
+            return LinkRefusedError(
+                f"nobody listens at {self.description}: check the port, and that the ACU or the simulator is on"
+            )
+        return LinkError(f"{self.description} cannot be reached: {error.strerror or error}")
 
     def write(self, data: bytes) -> None:
         """Send; never waits.  LinkError: not connected."""

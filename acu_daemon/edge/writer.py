@@ -36,7 +36,16 @@ class Writer:
         self._begun_s: float | None = None  # when the job in hand began, on the monotonic clock
         self.dropped_count = 0
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)  # a stuck one holds no exit up
-        self._thread.start()
+        self._has_thread = False
+        self._begin()
+
+    def _begin(self) -> bool:
+        """Have the thread; False: the system denies it, and every job that comes tries again."""
+        if not self._has_thread:
+            with contextlib.suppress(RuntimeError):
+                self._thread.start()
+                self._has_thread = True
+        return self._has_thread
 
     @property
     def waiting_count(self) -> int:
@@ -44,7 +53,9 @@ class Writer:
 
     @property
     def problem(self) -> str:
-        """That the job in hand does not end; "": all is well."""
+        """That the job in hand does not end, or that there is no thread; "": all is well."""
+        if not self._has_thread:
+            return "the system denies a thread: the loop itself waits for the disk"
         begun_s = self._begun_s
         if begun_s is None or time.monotonic() - begun_s < STUCK_S:
             return ""
@@ -53,10 +64,14 @@ class Writer:
     def put(self, job: Job) -> bool:
         """Have a job done; never waits.  False: dropped.
 
-        What a job puts itself is done at once, and so is what comes after `close`, unless the thread is stuck.
+        What a job puts itself is done at once, and so is what comes after `close`, unless the thread is stuck, and all
+        while the system denies a thread.
         """
         if threading.current_thread() is self._thread or (self._is_closed and not self._thread.is_alive()):
             job()
+            return True
+        if not self._begin():
+            self._do(job)
             return True
         if self._is_closed or self._jobs.qsize() >= self._limit:
             self.dropped_count += 1
@@ -69,20 +84,24 @@ class Writer:
         if not self._is_closed:
             self._is_closed = True
             self._jobs.put(None)
-        self._thread.join(timeout_s)
+        if self._has_thread:
+            self._thread.join(timeout_s)
         return not self._thread.is_alive()
 
     def _work(self) -> None:
         while (job := self._jobs.get()) is not None:
             self._begun_s = time.monotonic()
-            try:
-                job()
-            except Exception as error:  # noqa: BLE001  one bad job must not end all others
-                structlog.get_logger("writer").error("writer.failed", reason=f"{type(error).__name__}: {error}")
+            self._do(job)
             self._begun_s = None
             if self._jobs.empty():
                 self._tell()
         self._tell()
+
+    def _do(self, job: Job) -> None:
+        try:
+            job()
+        except Exception as error:  # noqa: BLE001  one bad job must not end all others
+            structlog.get_logger("writer").error("writer.failed", reason=f"{type(error).__name__}: {error}")
 
     def _tell(self) -> None:
         dropped_count = self.dropped_count - self._told_count
@@ -146,7 +165,7 @@ def write_text(stream: TextIO | None, text: str) -> None:
             stream.write(text)
             stream.flush()
         return
-    data = text.encode("utf-8", "backslashreplace")
+    data = text.encode(getattr(stream, "encoding", None) or "utf-8", "backslashreplace")
     with contextlib.suppress(OSError):
         while data:
             data = data[os.write(fd, data) :]

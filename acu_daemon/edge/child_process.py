@@ -1,0 +1,40 @@
+"""Processes of our own: started so that they load what this one would, and watched without a thread."""
+
+import asyncio
+import contextlib
+import os
+import sys
+from typing import Any
+
+
+async def start_python(module: str, *arguments: str, **pipes: Any) -> asyncio.subprocess.Process:
+    """Run a module of this package in a process of its own, with the same places to load from and no others.
+
+    -P: Python would put the working directory first, where any file may have a library's name.
+    pipes: of asyncio.create_subprocess_exec.  Raises: OSError: the system denies it; it may pass later.
+    """
+    places = os.pathsep.join(place for place in sys.path if place)
+    return await start(sys.executable, "-P", "-m", module, *arguments, env=os.environ | {"PYTHONPATH": places}, **pipes)
+
+
+async def start(*command: str, **pipes: Any) -> asyncio.subprocess.Process:
+    """Start a program.  OSError: the system denies it; it may pass later."""
+    _watch_without_a_thread()
+    try:
+        return await asyncio.create_subprocess_exec(*command, **pipes)
+    except RuntimeError as error:  # no thread for its watcher
+        raise OSError(f"{error}") from None
+
+
+def _watch_without_a_thread() -> None:
+    """Python 3.11 watches each child from a thread of its own, later ones do so only where the kernel is old."""
+    if sys.version_info >= (3, 12):
+        return
+    policy = asyncio.get_event_loop_policy()
+    with contextlib.suppress(OSError):  # an old kernel: then from a thread
+        os.close(os.pidfd_open(os.getpid()))
+        if not isinstance(policy.get_child_watcher(), asyncio.PidfdChildWatcher):
+            policy.set_child_watcher(asyncio.PidfdChildWatcher())
+        watcher = policy.get_child_watcher()
+        if not watcher.is_active():
+            watcher.attach_loop(asyncio.get_running_loop())
