@@ -1,6 +1,8 @@
 """The command line itself: one typer app, and the exit status of every kind of failure."""
 
+import contextlib
 import gc
+import io
 import os
 import sys
 import traceback
@@ -12,6 +14,7 @@ from typing import Annotated
 import typer
 
 from acu_daemon import __version__
+from acu_daemon.edge.denied import denied
 from acu_daemon.errors import AcuDaemonError, NoAcuError, UsageError
 
 EXIT_FAILED, EXIT_USAGE, EXIT_NO_ACU, EXIT_INTERNAL = 1, 2, 3, 4
@@ -114,31 +117,72 @@ def _add(app: typer.Typer, commands: Mapping[str, tuple[str, str]], names: Itera
 
 def main() -> None:
     """Run a command; every failure ends with its exit status and a message that says what to do."""
+    have_streams()
     try:
-        app = make_app(sys.argv[1:])
-        gc.freeze()  # what was loaded stays: no collection has to look at it again
-        gc.enable()
-        app()
-    except NoAcuError as error:
-        _complain(error)
-        sys.exit(EXIT_NO_ACU)
-    except UsageError as error:
-        _complain(error)
-        sys.exit(EXIT_USAGE)
-    except AcuDaemonError as error:
-        _complain(error)
-        sys.exit(EXIT_FAILED)
-    except KeyboardInterrupt:
-        sys.exit(130)
-    except BrokenPipeError:  # whoever read our output has gone, such as `| head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        sys.exit(EXIT_FAILED)
-    except Exception:  # noqa: BLE001  the last word of the program: an error of ours, with all we know
-        traceback.print_exc()
-        print("acu-daemon: internal error; please report the lines above", file=sys.stderr)  # noqa: T201
-        sys.exit(EXIT_INTERNAL)
+        try:
+            app = make_app(sys.argv[1:])
+            gc.freeze()  # what was loaded stays: no collection has to look at it again
+            gc.enable()
+            app()
+        finally:
+            sys.stdout.flush()  # while what a full disk says can still be told
+    except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001  the last word of the program
+        sys.exit(_last_word(error))
 
 
-def _complain(error: AcuDaemonError) -> None:
-    for line in str(error).splitlines():
-        print(f"acu-daemon: {line}", file=sys.stderr)  # noqa: T201
+def have_streams() -> None:
+    """Make sure that output goes somewhere, and that no name of a station is too much for the locale.
+
+    A stream that whoever started this program has closed is put on /dev/null: else the next file that is opened takes
+    its number, and what a library prints goes into that.
+    """
+    for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # the lowest free number: this one
+        stream = getattr(sys, name)
+        if stream is None:
+            mode = "r" if name == "stdin" else "w"
+            setattr(sys, name, open(descriptor, mode, errors="backslashreplace", closefd=False))  # noqa: SIM115
+        elif name != "stdin" and isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _last_word(error: BaseException) -> int:
+    """Say what went wrong; returns the exit status."""
+    match error:
+        case KeyboardInterrupt():
+            return 130
+        case NoAcuError():
+            return _complain(str(error), EXIT_NO_ACU)
+        case UsageError():
+            return _complain(str(error), EXIT_USAGE)
+        case AcuDaemonError():
+            return _complain(str(error), EXIT_FAILED)
+        case BrokenPipeError():  # whoever read our output has gone, such as `| head`
+            _forget_output()
+            return EXIT_FAILED
+    if words := denied(error):
+        where = "standard output: " if _forget_output() else ""
+        return _complain(f"the system denies what this needs: {where}{words}", EXIT_USAGE)
+    traceback.print_exception(error)
+    return _complain("internal error; please report the lines above", EXIT_INTERNAL)
+
+
+def _forget_output() -> bool:
+    """Whether output could not be written; it is not tried again at the end."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        with contextlib.suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        return True
+    return False
+
+
+def _complain(text: str, status: int) -> int:
+    with contextlib.suppress(OSError):  # standard error may be full or gone
+        for line in text.splitlines():
+            print(f"acu-daemon: {line}", file=sys.stderr)  # noqa: T201
+    return status

@@ -8,6 +8,7 @@ import math
 import os
 import sys
 import time
+from collections.abc import Coroutine
 from dataclasses import asdict, replace
 from enum import StrEnum
 from pathlib import Path
@@ -39,6 +40,7 @@ from acu_daemon.daemon.service import Outcome, PassJob, Service
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.control_socket import ControlSocket
+from acu_daemon.edge.denied import denied
 from acu_daemon.edge.fit import ProcessFitRunner
 from acu_daemon.edge.link import Link, check_rate, make_link
 from acu_daemon.edge.logs import configure_logs, tell_dropped, tell_signal
@@ -48,6 +50,7 @@ from acu_daemon.edge.signals import STOPS, take_signals
 from acu_daemon.edge.state import SnapshotFile, state_directory
 from acu_daemon.edge.systemd import Notifier
 from acu_daemon.edge.writer import QueuedStream, Writer
+from acu_daemon.errors import AcuDaemonError
 from acu_daemon.model import Pass
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.protocol.sa3842 import address_byte
@@ -133,12 +136,24 @@ def command(
         job = make_job(target, coming, link, is_rehearsal=clock.is_rehearsal, end_tai_s=end_tai_s, carried=kept.carried)
         job = replace(job, control=replace(job.control, is_shadow=shadow))
         job = replace(job, state=kept.state)
-        outcome = asyncio.run(_run(job, link, clock, live, recording, files, kept, directory))
+        runner = ends.enter_context(asyncio.Runner())
+        runner.get_loop()  # where the system denies even that, another start would be refused as well
+        outcome = _watched(runner, _run(job, link, clock, live, recording, files, kept, directory))
         structlog.get_logger("run").info("run.done", **asdict(outcome))
     if not outcome.is_stopped:
         raise typer.Exit(1)
     if outcome.has_begun and not outcome.has_acquired and outcome.reason not in {number.name for number in STOPS}:
         raise typer.Exit(1)
+
+
+def _watched(runner: asyncio.Runner, run: Coroutine[Any, Any, Outcome]) -> Outcome:
+    """Run it.  AcuDaemonError: the system denied something in mid-run, so that a supervisor starts the daemon again."""
+    try:
+        return runner.run(run)
+    except (OSError, MemoryError, RuntimeError, ImportError, ExceptionGroup) as error:
+        if words := denied(error):
+            raise AcuDaemonError(f"the system denies what the run needs: {words}") from error
+        raise
 
 
 def make_job(

@@ -28,6 +28,7 @@ ANSWER_S = 3.0
 AGAIN_S = 0.01
 NO_LOCK = -1
 DISK_FAILS = (errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.EIO)
+SYSTEM_FAILS = (errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ENOBUFS)
 
 
 class ControlSocket:
@@ -41,7 +42,7 @@ class ControlSocket:
         self._client_count = 0
 
     async def open(self) -> None:
-        """Begin to listen; where the disk fails, go on without: the antenna matters more.
+        """Begin to listen; where the disk or the system fails, go on without: the antenna matters more.
 
         UsageError: another daemon runs with this state directory, or no socket may be made in it.
         """
@@ -50,12 +51,13 @@ class ControlSocket:
         try:
             listener = _listen(self._directory)
         except OSError as error:
-            if error.errno not in DISK_FAILS:
+            if error.errno not in (*DISK_FAILS, *SYSTEM_FAILS):
                 await self.close()
                 advice = "choose another place with --state DIR"
                 raise UsageError(f"{path}: cannot be made: {error.strerror}; {advice}") from None
             log: Any = structlog.get_logger("control")
-            advice = "arm, disarm, clear and status cannot reach this daemon: mend the disk, then start it again"
+            what = "mend the disk" if error.errno in DISK_FAILS else "allow it more"
+            advice = f"arm, disarm, clear and status cannot reach this daemon: {what}, then start it again"
             log.error("control.no_socket", file=str(path), reason=error.strerror, advice=advice)
             return
         self._server = await asyncio.start_unix_server(
@@ -157,13 +159,20 @@ def _lock(directory: Path) -> int:
     try:
         descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     except OSError as error:
+        if error.errno in SYSTEM_FAILS:
+            raise
         raise UsageError(f"{directory}: {error.strerror}; choose another place with --state DIR") from None
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
+    except BlockingIOError:
         os.close(descriptor)
         raise UsageError(
             f"{directory}: another daemon runs with this state directory; give each its own --state DIR"
+        ) from None
+    except OSError as error:
+        os.close(descriptor)
+        raise UsageError(
+            f"{directory} cannot be locked: {error.strerror}; give it a local disk by --state DIR"
         ) from None
     return descriptor
 
