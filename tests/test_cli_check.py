@@ -116,6 +116,7 @@ def test_when_all_is_well_every_line_is_go_and_the_status_0(tmp_path: Path) -> N
     found = lines(done)
     assert [(what, verdict) for what, (verdict, _) in found.items()] == [
         ("station.toml", "GO"),
+        ("place", "GO"),
         ("clock", "GO"),
         ("scd: elements", "GO"),
         ("scd: next pass", "GO"),
@@ -128,6 +129,31 @@ def test_when_all_is_well_every_line_is_go_and_the_status_0(tmp_path: Path) -> N
     assert done.code == 0
     assert last(done) == "GO: ready"
     assert found["ACU"][1] == "SA-3842 10, STANDBY, az 0.00 el 0.00, AGC 7.5 dB"
+
+
+@pytest.mark.parametrize(
+    ("latitude", "longitude", "place"),
+    [
+        ("-15.53", "-56.07", "15.53 deg south, 56.07 deg west, 277 m; at 1989-02-01T00:00:00Z it is night there, "),
+        ("15.53", "303.93", "15.53 deg north, 56.07 deg west, 277 m; at 1989-02-01T00:00:00Z it is night there, "),
+        ("-15.53", "123.93", "15.53 deg south, 123.93 deg east, 277 m; at 1989-02-01T00:00:00Z it is day there, "),
+    ],
+)
+def test_the_position_is_told_as_a_place_with_its_daylight(
+    tmp_path: Path, latitude: str, longitude: str, place: str
+) -> None:
+    text = replaced(STATION, "latitude_deg = -15.53", f"latitude_deg = {latitude}")
+    text = replaced(text, "longitude_deg = -56.07", f"longitude_deg = {longitude}")
+    text = replaced(text, "tcp://127.0.0.1:3842", "serial:///dev/none?baud=4800")
+    verdict, said = lines(acu_daemon("check", "--config", write(tmp_path, text)))["place"]
+    assert (verdict, said[: len(place)]) == ("GO", place)
+
+
+def test_the_suns_direction_is_told_as_skyfield_has_it(tmp_path: Path) -> None:
+    text = replaced(STATION, "tcp://127.0.0.1:3842", "serial:///dev/none?baud=4800")
+    at = ("--at", "1989-02-01T02:00:00Z")
+    said = lines(acu_daemon("check", "--config", write(tmp_path, text), *at))["place"][1]
+    assert said.endswith("night there, the sun at azimuth 222.8, elevation -46.3 deg")  # tests/test_sun.py
 
 
 def test_a_check_asks_and_never_changes_anything(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 
 from acu_daemon.cli.options import (
@@ -28,13 +29,15 @@ from acu_daemon.edge.latch import ADVICE, DISARMED, LATCH
 from acu_daemon.edge.link import check_rate, make_link, open_once
 from acu_daemon.edge.state import SNAPSHOT, state_directory, state_path
 from acu_daemon.errors import AcuDaemonError, LinkError, OrbitError, UsageError
+from acu_daemon.model import Site
 from acu_daemon.orbit.passes import find_passes
+from acu_daemon.orbit.sun import RISEN_EL_DEG, sun_direction_deg
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.orbit.visibility import why_none
 from acu_daemon.protocol.exchange import HostExchange
 from acu_daemon.protocol.messages import AcuMode, Command, Faults, Identify, Identity, Poll, ReadFaults, Reply, Status
 from acu_daemon.protocol.sa3842 import address_byte
-from acu_daemon.units import DAY_S
+from acu_daemon.units import DAY_S, wrap_180
 
 REPLY_S = 0.5
 HEALTHY_AGE_S = 5.0
@@ -88,6 +91,7 @@ def _findings(config: Path, satellite: str | None, now_tai_s: float, state: Path
         yield Finding(NO_GO, "station.toml", str(error))
         return
     yield Finding(GO, "station.toml", f"{station.station.name}, ACU at {station.acu.url}")
+    yield Finding(GO, "place", place_text(station.site, now_tai_s))
     if station.safety.arm == "manual":
         yield Finding(WARN, "arming", '[safety] arm = "manual": the daemon writes nothing until a person arms it')
     yield from _left_behind(state_path(state, is_rehearsal=False))
@@ -105,6 +109,20 @@ def _findings(config: Path, satellite: str | None, now_tai_s: float, state: Path
         yield Finding(NO_GO, "line rate", str(error))
         return
     yield from asyncio.run(_acu(station.acu.url, address_byte(station.acu.address)))
+
+
+def place_text(site: Site, now_tai_s: float) -> str:
+    """The position as a place, and where the sun stands there: a wrong sign is seen by looking out of the window."""
+    station = site.station
+    east_deg = wrap_180(station.longitude_deg)
+    latitude = f"{abs(station.latitude_deg):g} deg {'north' if station.latitude_deg >= 0 else 'south'}"
+    longitude = f"{abs(east_deg):g} deg {'east' if east_deg >= 0 else 'west'}"
+    az_deg, el_deg = (float(angle[0]) for angle in sun_direction_deg(np.array([now_tai_s]), site))
+    light = "day" if el_deg > RISEN_EL_DEG else "night"
+    when = (
+        f"at {utc_text(now_tai_s, 0)} it is {light} there, the sun at azimuth {az_deg:.1f}, elevation {el_deg:.1f} deg"
+    )
+    return f"{latitude}, {longitude}, {station.height_m:g} m; {when}"
 
 
 def _left_behind(directory: Path) -> Iterator[Finding]:
