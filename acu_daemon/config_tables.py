@@ -13,6 +13,7 @@ from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.protocol.sa3842 import address_byte
 
 DEFAULT_LIMITS = ElementLimits()
+LEAST_LOW_WATER_S = 4.0  # a niced fit on a busy machine takes a second: less would end good ones (daemon.background)
 
 
 def _tai(value: object) -> float:
@@ -116,7 +117,7 @@ class ReadingsSection(Section):
 
 class TrackingSection(Section):
     horizon_s: float = Field(default=90.0, ge=10, le=600)
-    low_water_s: float = Field(default=30.0, ge=2, le=500)
+    low_water_s: float = Field(default=30.0, le=500)
     max_fit_elevation_deg: float = Field(default=80.0, gt=0, le=90)
     estimator: Literal["circular", "deterministic", "kalman", "full"] = "full"
     preposition_s: float = Field(default=120.0, ge=10, le=3600)
@@ -125,6 +126,11 @@ class TrackingSection(Section):
 
     @model_validator(mode="after")
     def _water_below_horizon(self) -> "TrackingSection":
+        if self.low_water_s < LEAST_LOW_WATER_S:
+            raise ValueError(
+                f"low_water_s = {self.low_water_s:g}: expected at least {LEAST_LOW_WATER_S:g}, of which half is for an "
+                "answer of the fit process, also one that starts, and half for a buffer made without it"
+            )
         self._must_be_below("low_water_s", "horizon_s")
         return self
 

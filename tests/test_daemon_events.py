@@ -28,9 +28,11 @@ from flights import (
 )
 
 from acu_daemon.cli.virtual_pass import Flight, Stage
+from acu_daemon.config_tables import LEAST_LOW_WATER_S
 from acu_daemon.control.refit import RefitReply, RefitRequest
+from acu_daemon.daemon.background import fit_deadline_s
 from acu_daemon.edge.clock import LoopClock
-from acu_daemon.edge.fit import FitFailedError, InlineFitRunner
+from acu_daemon.edge.fit import START_S, FitDiedError, FitFailedError, InlineFitRunner
 from acu_daemon.errors import NoAcuError, UsageError
 from acu_daemon.protocol.messages import (
     AcuMode,
@@ -533,6 +535,37 @@ def test_p9_a_fit_that_answers_late_disturbs_no_tick() -> None:
     gaps_s = write_gaps_s(flight, T + 8.0)
     assert gaps_s == pytest.approx([TICK_S] * len(gaps_s), abs=1e-3)
     assert worst_error_deg(flight, T + 25.0, T + 35.0) < HOLD_DEG
+
+
+class Hanging(InlineFitRunner):
+    """Hangs from its tenth question on, for ever, or until a deadline ends it, as its successors are ended."""
+
+    asked_count = 0
+    deadline_s = float("inf")
+    start_s = 0.0  # that a new one has more
+
+    async def refit(self, request: RefitRequest) -> RefitReply:
+        self.asked_count += 1
+        if self.asked_count < 10:
+            return await super().refit(request)
+        await asyncio.sleep(min(self.deadline_s + (self.start_s if self.asked_count > 10 else 0.0), 1e6))
+        raise FitDiedError("the fit process gave no answer")
+
+
+class EndedHanging(Hanging):
+    deadline_s, start_s = fit_deadline_s(10.0), START_S
+
+
+@pytest.mark.parametrize("runner", [Hanging, EndedHanging])
+@pytest.mark.parametrize(("horizon_s", "low_water_s"), [(30.0, 10.0), (10.0, LEAST_LOW_WATER_S)])
+def test_p9_a_fit_that_hangs_never_leaves_a_dry_buffer(
+    runner: type[Hanging], horizon_s: float, low_water_s: float
+) -> None:
+    target = demo_target(tracking={"horizon_s": horizon_s, "low_water_s": low_water_s})
+    flight = climb(100.0, target, losses=[(15.0, 98.0)], make_runner=runner)
+    assert min(seen.buffer_s for seen in flight.snapshots if seen.buffer_kind) > 0.4 * low_water_s
+    assert worst_error_deg(flight, T + 15.0, T + 98.0) < HOLD_DEG
+    assert flight.states()[-1] == "AUTOTRACK/FITTED"
 
 
 # Time

@@ -34,6 +34,7 @@ from acu_daemon.cli.options import (
 )
 from acu_daemon.config import control_config, estimator_settings
 from acu_daemon.control.refit import RefitSetup
+from acu_daemon.daemon.background import fit_deadline_s
 from acu_daemon.daemon.health import Health
 from acu_daemon.daemon.live import LiveLine
 from acu_daemon.daemon.service import Outcome, PassJob, Service
@@ -242,7 +243,7 @@ async def _run(
         job,
         link,
         clock,
-        ProcessFitRunner(job.refit),
+        ProcessFitRunner(job.refit, fit_deadline_s(job.low_water_s)),
         on_snapshot=show,
         snapshot_ticks=snapshot_ticks,
         on_reading=recording.add if recording else None,

@@ -22,8 +22,15 @@ REFIT_PERIOD_S = 1.0  # an accepted fit replaces the buffer at least once a seco
 PAST_S = 1.0  # the buffer starts this long before now: readings are compared at the time of their sample
 LEAST_HORIZON_S = 10.0  # of a buffer, also where the satellite is about to decay
 RETRY_S = 0.5
+LONGEST_ANSWER_S = 5.0  # of the fit process
+ANSWER_SHARE = 0.5  # of the low water is for its answer, the rest is left when the daemon predicts without it
 LONGEST_PAUSE_S = 30.0  # a fit process that dies again and again is started this often at last
 FIRST_FIT_COUNT = 5  # a fit to fewer readings is no better than the offset that carries the path until then
+
+
+def fit_deadline_s(low_water_s: float) -> float:
+    """How long an answer of the fit process may take, so that one that hangs is ended before the buffer is dry."""
+    return min(LONGEST_ANSWER_S, ANSWER_SHARE * low_water_s)
 
 
 class Background:
@@ -56,6 +63,8 @@ class Background:
         self._due = asyncio.Event()
         self._last_tai_s = -1e18
         self._has_asked = False
+        self._is_waiting = False  # for the fit process
+        self._kept_tai_s = -1e18
         self._died_count = 0  # in a row
         self._pause_until_tai_s = -1e18
         self._seen: TrackState | None = None
@@ -66,7 +75,14 @@ class Background:
             area.state = replace(area.state, has_acquired=True)
 
     def wake(self) -> None:
-        """Look whether a refit is due.  Called by the foreground after every tick; never blocks."""
+        """Look whether a refit is due.  Called by the foreground after every tick; never blocks.
+
+        While the fit process has not answered, the daemon itself keeps the buffer from running dry.
+        """
+        now_tai_s = self._clock.tai_s()
+        if self._is_waiting and now_tai_s - self._kept_tai_s >= RETRY_S:
+            self._kept_tai_s = now_tai_s
+            self._predict_here(now_tai_s, ANSWER_SHARE * self._low_water_s)
         if self._is_due():
             self._due.set()
 
@@ -106,6 +122,7 @@ class Background:
             return
         self._has_asked = True
         request = self._request(now_tai_s, area.take_readings())
+        self._is_waiting = True
         try:
             reply = await self._runner.refit(request)
         except (FitFailedError, OrbitError) as error:
@@ -115,6 +132,8 @@ class Background:
             self._log.warning("fit.failed", reason=str(error), pause_s=pause_s)
             self._predict_here(self._clock.tai_s())
             return
+        finally:
+            self._is_waiting = False
         self._died_count = 0
         took_ms = 1e3 * (self._clock.tai_s() - now_tai_s)
         self._log.debug("fit.done", readings=len(request.readings), took_ms=took_ms, fit=reply.fit)
@@ -125,10 +144,11 @@ class Background:
         self._died_count = self._died_count + 1 if has_died else 0
         return min(2.0 ** (self._died_count - 2), LONGEST_PAUSE_S) if self._died_count > 1 else 0.0
 
-    def _predict_here(self, now_tai_s: float) -> None:
+    def _predict_here(self, now_tai_s: float, low_water_s: float | None = None) -> None:
         """Without the fit process: keep the buffer filled from the last fit, else the elements; 2 ms in the loop."""
         sky = self._area.sky
-        if sky.prediction is not None and sky.prediction.end_tai_s - now_tai_s > self._low_water_s:
+        low_water_s = self._low_water_s if low_water_s is None else low_water_s
+        if sky.prediction is not None and sky.prediction.end_tai_s - now_tai_s > low_water_s:
             return
         request = self._request(now_tai_s, Readings.of([]))
         try:
