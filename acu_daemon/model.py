@@ -195,6 +195,8 @@ class Prediction:
     made_at_tai_s: float
     sigma_deg: Array | None = None
     model: Model = Model.ELEMENTS  # the kind, more closely
+    spread: tuple[float, float] | None = None  # 1 sigma at made_at: along the track, s, and across it, deg
+    late_drift_deg_s: Array | None = None  # (2, N): right and up, what a second of lateness moves beside `at`
 
     @property
     def end_tai_s(self) -> float:

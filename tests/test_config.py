@@ -133,7 +133,11 @@ STATION_MISTAKES = [
     ("[station]", "[[station]]", "station = [{'latitude_deg': -15.53"),
     ("[station]", "[tracking]\nestimator = 'best'\n[station]", "tracking.estimator = \"best\": expected 'circular',"),
     ("[station]", "[tracking]\nlow_water_s = 95.0\n[station]", "tracking.low_water_s = 95: expected less than horizon"),
-    ("[station]", "[tracking]\nlow_water_s = 3.9\n[station]", "tracking.low_water_s = 3.9: expected at least 4, of which"),
+    (
+        "[station]",
+        "[tracking]\nlow_water_s = 3.9\n[station]",
+        "tracking.low_water_s = 3.9: expected at least 4, of",
+    ),
     ("[station]", "[safety]\narm = true\n[station]", "safety.arm = true: expected 'auto' or 'manual'"),
     (
         "[station]",

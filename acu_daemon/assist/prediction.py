@@ -6,9 +6,10 @@ import numpy as np
 
 from acu_daemon.assist.encoder import encoder_look, sigma_deg
 from acu_daemon.model import FitResult, Prediction, PredictionKind, Site
-from acu_daemon.orbit.look import look_along
+from acu_daemon.orbit.frames import enu_from_itrs, station_itrs_m
+from acu_daemon.orbit.look import Look, look_along
 from acu_daemon.orbit.propagator import Propagator
-from acu_daemon.units import Array, wrap_180, wrap_180_array
+from acu_daemon.units import DEG, EARTH_RATE_RAD_S, Array, wrap_180, wrap_180_array
 
 FollowPath = Callable[[Array, Array, float], tuple[Array, Array]]
 """From continuous azimuth, its rate (N,) and the step in s to an azimuth path and rate that the drive can follow."""
@@ -34,10 +35,11 @@ def predict(
 ) -> Prediction:
     """Predict pointing from start_tai_s over horizon_s.
 
-    near_az_deg: continuous azimuth (encoder frame) near which the path starts; it picks the turn.  From there azimuth
-    is continuous, through north and past the zenith.  follow: makes the path for an antenna that follows the registers,
-    such as `pointing.keyhole.follow_path` with the drive's limits; it sees the path from lead_in_s before the start,
-    so that a buffer that starts inside the keyhole continues what the one before it planned.
+    near_az_deg: continuous azimuth (encoder frame) near which the path is at made_at_tai_s, or at its start where that
+    is later; it picks the turn.  From there azimuth is continuous, through north and past the zenith.  follow: makes
+    the path for an antenna that follows the registers, such as `pointing.keyhole.follow_path` with the drive's limits;
+    it sees the path from lead_in_s before the start, so that a buffer that starts inside the keyhole continues what the
+    one before it planned.
     fit: what corrected the propagator; its biases and its place of the station are in the prediction, and its
     covariance gives sigma_deg.
     Raises:  OrbitError: the propagator has no answer for one of the times.
@@ -47,7 +49,8 @@ def predict(
     tai_s = start_tai_s + step_s * np.arange(-before, round(horizon_s / step_s) + 1, dtype=np.float64)
     seen = encoder_look(propagator, tai_s, site, fit, look_along)
     az_deg = _continuous(seen.az_deg, seen.az_rate_deg_s, step_s)
-    az_deg += near_az_deg + wrap_180(float(seen.az_deg[before]) - near_az_deg) - az_deg[before]
+    near = min(max(before + round((made_at_tai_s - start_tai_s) / step_s), before), tai_s.size - 1)
+    az_deg += near_az_deg + wrap_180(float(seen.az_deg[near]) - near_az_deg) - az_deg[near]
     follow_az_deg, follow_az_rate_deg_s = follow(az_deg, seen.az_rate_deg_s, step_s)
     return Prediction(
         start_tai_s=start_tai_s,
@@ -61,7 +64,28 @@ def predict(
         kind=kind,
         made_at_tai_s=made_at_tai_s,
         sigma_deg=sigma_deg(propagator, tai_s[before:], site, fit),
+        late_drift_deg_s=_late_drift_deg_s(seen, site)[:, before:],
     )
+
+
+def _late_drift_deg_s(seen: Look, site: Site) -> Array:
+    """How far beside its path, right and up, a satellite is seen that comes a second late: the Earth turns on, (2, N).
+
+    An orbit that is a second late puts the satellite at the same place in space a second later; seen from the Earth
+    that place has moved by the turn of a second, westward.
+    """
+    az, el = np.radians(seen.az_deg), np.radians(seen.el_deg)
+    sin_az, cos_az, sin_el, cos_el = np.sin(az), np.cos(az), np.sin(el), np.cos(el)
+    axes = enu_from_itrs(site.station)
+    from_centre_m = (axes @ station_itrs_m(site.station))[:, None] + seen.range_m * np.stack(
+        (cos_el * sin_az, cos_el * cos_az, sin_el)
+    )
+    turn_rad_s = axes @ np.array((0.0, 0.0, EARTH_RATE_RAD_S))
+    moved_m_s = -np.cross(turn_rad_s, from_centre_m, axisb=0, axisc=0)
+    right = cos_az * moved_m_s[0] - sin_az * moved_m_s[1]
+    up = cos_el * moved_m_s[2] - sin_el * (sin_az * moved_m_s[0] + cos_az * moved_m_s[1])
+    drift: Array = np.stack((right, up)) / seen.range_m / DEG
+    return drift
 
 
 def _continuous(az_deg: Array, az_rate_deg_s: Array, step_s: float) -> Array:

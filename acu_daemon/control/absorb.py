@@ -5,13 +5,12 @@ from acu_daemon.control.changed import changed
 from acu_daemon.control.encoder_watch import EncoderWatch, watch_encoders
 from acu_daemon.control.start import after_reply
 from acu_daemon.control.state import ControlConfig, ControlState, Event, Observation, Sky, Stage, Watchdog
+from acu_daemon.control.states import AUTOTRACKING
 from acu_daemon.model import Pointing, Reading
 from acu_daemon.pointing.wrap import encoder_continuous
 from acu_daemon.protocol.angles import LSB_DEG
 from acu_daemon.protocol.messages import AcuMode, Backup, Nak, Status, Stop
-from acu_daemon.units import wrap_180
 
-OFFSET_GAIN = 0.6  # of the newest reading in the smoothed distance to the prediction: autotrack pulls in quickly
 RATE_READINGS = 6  # the rate of an axis is taken over this many readings: near the zenith one pair is all noise
 STEADY_SHARE = 0.1  # of a step of the registers: more change than that from one to the next is acceleration
 REFUSED_EXTRA_S = 2.0  # after a NAK the same extra command waits this long: no blind repetition
@@ -28,9 +27,8 @@ def absorb(
     if seen.status is not None and seen.reading is not None:
         state = _absorb_in_force(state, seen)
         state = _absorb_reading(state, seen.status, seen.reading, config, is_confirmed=seen.is_confirmed)
-        path = sky.prediction.at(seen.reading.tai_s) if sky.prediction and is_acquired(seen.status) else None
-        if path is not None:
-            state = _absorb_offset(state, path, seen.reading)
+        is_ours = is_acquired(seen.status) and state.track in AUTOTRACKING
+        path = sky.prediction.at(seen.reading.tai_s) if sky.prediction and is_ours else None
         state = _absorb_encoders(state, path, seen.status, seen.reading, events)
     if seen.extra is not None:
         state = after_reply(state, seen.extra, config, events)
@@ -72,7 +70,6 @@ def _absorb_reading(
     state: ControlState, status: Status, reading: Reading, config: ControlConfig, *, is_confirmed: bool
 ) -> ControlState:
     az_deg = encoder_continuous(status.az_deg, status.is_sector_high, config.azimuth)
-    since = (state.acquired_since_tai_s or reading.tai_s) if is_acquired(status) else None
     state = _learn_lag(state, az_deg, status.el_deg)
     return changed(
         state,
@@ -83,9 +80,6 @@ def _absorb_reading(
         is_place_sure=is_confirmed,
         az_deg=az_deg,
         track_of_readings=(*state.track_of_readings[1 - RATE_READINGS :], (reading.tai_s, az_deg, status.el_deg)),
-        acquired_since_tai_s=since,
-        has_locked=state.has_locked or (since is not None and reading.tai_s - since >= config.lock_dwell_s),
-        has_acquired=state.has_acquired or since is not None,
         is_stow_kept=_is_stow_kept(state, status),
     )
 
@@ -137,16 +131,3 @@ def _is_steady(before_deg: float, in_force_deg: float, newest_deg: float) -> boo
     """Whether an axis moves at a nearly constant rate, so that what it is short of is lag, not acceleration."""
     step_deg, next_deg = in_force_deg - before_deg, newest_deg - in_force_deg
     return abs(next_deg - step_deg) < STEADY_SHARE * abs(step_deg) + 2 * LSB_DEG
-
-
-def _absorb_offset(state: ControlState, path: Pointing, reading: Reading) -> ControlState:
-    """Follow the distance between reading and prediction while acquired: it carries the path before the first fit."""
-    az = wrap_180(reading.az_deg - path.az_deg)
-    el = reading.el_deg - path.el_deg
-    if state.offset_az_deg is None:
-        return changed(state, offset_az_deg=az, offset_el_deg=el)
-    return changed(
-        state,
-        offset_az_deg=state.offset_az_deg + OFFSET_GAIN * wrap_180(az - state.offset_az_deg),
-        offset_el_deg=state.offset_el_deg + OFFSET_GAIN * (el - state.offset_el_deg),
-    )

@@ -14,6 +14,7 @@ from acu_daemon.assist.gate import OUTLIER
 from acu_daemon.assist.model_choice import ModelChoice, choose, is_good, newest_residual_deg
 from acu_daemon.assist.prediction import predict
 from acu_daemon.assist.spans import span_s
+from acu_daemon.assist.spread import spread_of
 from acu_daemon.assist.track_gate import TrackGate
 from acu_daemon.model import AxisLimits, FitResult, Model, Prediction, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
@@ -233,4 +234,8 @@ def predict_from(setup: RefitSetup, fit: FitResult | None, request: RefitRequest
         follow=partial(follow_path, azimuth=setup.azimuth),
         fit=fit,
     )
-    return replace(prediction, model=model)
+    at = prediction.at(request.now_tai_s)
+    spread = None
+    if at is not None:
+        spread = spread_of(setup.propagator, setup.site, setup.settings, fit, request.now_tai_s, at)
+    return replace(prediction, model=model, spread=spread)

@@ -9,7 +9,7 @@ from acu_daemon.control.axis_watch import AxesWatch, Bounds
 from acu_daemon.control.encoder_watch import EncoderWatch
 from acu_daemon.control.lag import LagEstimate
 from acu_daemon.control.states import TrackState
-from acu_daemon.model import AxisLimits, FitResult, Prediction, Reading
+from acu_daemon.model import AxisLimits, FitResult, Model, Prediction, Reading
 from acu_daemon.pointing.axis import AxisState
 from acu_daemon.protocol.messages import Command, Identity, Nak, Reply, Status
 
@@ -84,6 +84,15 @@ class Held:
     has_interlock_fault: bool = False  # n5.b3: the bit with which the ACU's register watchdog shows
 
 
+@dataclass(frozen=True, slots=True)
+class PathOffset:
+    """The satellite beside the prediction from a model, smoothed: seconds late, degrees right (control.track_frame)."""
+
+    along_s: float
+    across_deg: float
+    model: Model
+
+
 @dataclass(frozen=True)
 class ControlState:
     """The memory of the 10 Hz decision.  Without slots, which `changed` (control.changed) cannot copy at once."""
@@ -105,8 +114,9 @@ class ControlState:
     has_acquired: bool = False
     is_stow_kept: bool = False  # somebody stowed the antenna while we looked on: it stays, also after a lost link
     hold_from_tai_s: float = -inf
-    offset_az_deg: float | None = None  # reading minus prediction, smoothed: carries the path before the first fit
-    offset_el_deg: float = 0.0
+    offset: PathOffset | None = None  # carries the path before the first fit
+    is_offset_refused: bool = False
+    pass_rise_tai_s: float | None = None  # of the pass for which it, and that a signal was acquired, is known
     axis_az: AxisState | None = None  # the last command as position and rate, continuous azimuth
     axis_el: AxisState | None = None
     was_followed: bool = False

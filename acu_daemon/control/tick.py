@@ -5,7 +5,6 @@ they take effect, and passes it through the safety gate.  control.state is its m
 """
 
 import math
-from dataclasses import replace
 
 from acu_daemon.control.absorb import absorb
 from acu_daemon.control.axis_watch import AxesWatch
@@ -25,6 +24,7 @@ from acu_daemon.control.hands import (
     watch_antenna,
 )
 from acu_daemon.control.modes import wanted_mode_command
+from acu_daemon.control.path_offset import forget_other_pass, learn_of_signal
 from acu_daemon.control.search import search_offset, search_pointing
 from acu_daemon.control.start import next_command
 from acu_daemon.control.state import (
@@ -39,6 +39,7 @@ from acu_daemon.control.state import (
     Watchdog,
 )
 from acu_daemon.control.states import ACTIVE, AUTOTRACKING, HOLDING, TrackState, transition
+from acu_daemon.control.track_frame import beside
 from acu_daemon.model import Pointing
 from acu_daemon.pointing.wrap import nearest_turn
 from acu_daemon.protocol.messages import Command, Poll, WriteAndPoll
@@ -62,7 +63,8 @@ def tick(
     state = settle_doubt(respect_stop(before, state, config, events), seen, events)
     state = respect_interlock(state, seen, config, events)
     state = let_be(watch_antenna(state, seen, config, events))
-    state = note_held(_walk(state, seen, sky, now_tai_s, config, events), config)
+    state = note_held(_walk(forget_other_pass(state, sky), seen, sky, now_tai_s, config, events), config)
+    state = learn_of_signal(state, seen, sky, config, events)
     is_write_owed = bool(before.commands) and before.commands[-1] is None
     state, orders = _order(state, seen, sky, now_tai_s, config, events, is_write_owed=is_write_owed)
     return fence(state, orders, config)
@@ -245,10 +247,19 @@ def _point(
             aim_tai_s - state.entered_tai_s, config.search_s, config.search_along_s, config.search_across_deg
         )
         return search_pointing(sky.prediction, aim_tai_s, offset, config.elevation, config.min_elevation_deg)
-    point = path_point(sky, aim_tai_s, follow=is_followed)
-    if state.track in (TrackState.AUTOTRACK_TLE, TrackState.HOLD_TLE) and state.offset_az_deg is not None and point:
-        return replace(point, az_deg=point.az_deg + state.offset_az_deg, el_deg=point.el_deg + state.offset_el_deg)
-    return point
+    return _learned_point(state, sky, aim_tai_s, is_followed=is_followed) or path_point(
+        sky, aim_tai_s, follow=is_followed
+    )
+
+
+def _learned_point(state: ControlState, sky: Sky, aim_tai_s: float, *, is_followed: bool) -> Pointing | None:
+    """The path as autotrack showed it before the first fit; None: as it is predicted."""
+    offset, prediction = state.offset, sky.prediction
+    if offset is None or prediction is None or offset.model is not prediction.model:
+        return None
+    if state.track not in (TrackState.AUTOTRACK_TLE, TrackState.HOLD_TLE):
+        return None
+    return beside(prediction, aim_tai_s, (offset.along_s, offset.across_deg), follow=is_followed)
 
 
 def _rest(state: ControlState, *, is_followed: bool) -> Pointing:

@@ -1,6 +1,7 @@
 """The background: fits the orbit to locked readings and keeps the prediction buffer filled (seed 001, 2.5)."""
 
 import asyncio
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -9,19 +10,23 @@ import structlog
 
 from acu_daemon.assist.gate import ABOVE_MAX_ELEVATION
 from acu_daemon.control.refit import GateVerdict, RefitReply, RefitRequest, RefitSetup, before_fit, predict_from
-from acu_daemon.control.state import PassPlan
+from acu_daemon.control.state import ControlConfig, PassPlan
 from acu_daemon.control.states import AUTOTRACKING, HOLDING, TrackState
+from acu_daemon.control.track_frame import extents
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.fit import FitDiedError, FitFailedError, FitRunner
 from acu_daemon.errors import OrbitError
 from acu_daemon.model import FitResult, Model, Readings
 from acu_daemon.orbit.propagator import spans_tai_s
+from acu_daemon.pointing.keyhole import longest_window_s
 
 REFIT_PERIOD_S = 1.0  # an accepted fit replaces the buffer at least once a second while locked
 PAST_S = 1.0  # the buffer starts this long before now: readings are compared at the time of their sample
 LEAST_HORIZON_S = 10.0  # of a buffer, also where the satellite is about to decay
 RETRY_S = 0.5
+REACH_SLACK_S = 1.0
+BESIDE = frozenset({TrackState.ACQUIRE_TLE, TrackState.AUTOTRACK_TLE, TrackState.HOLD_TLE, TrackState.SEARCH})
 LONGEST_ANSWER_S = 5.0  # of the fit process
 ANSWER_SHARE = 0.5  # of the low water is for its answer, the rest is left when the daemon predicts without it
 LONGEST_PAUSE_S = 30.0  # a fit process that dies again and again is started this often at last
@@ -48,7 +53,7 @@ class Background:
         *,
         horizon_s: float,
         low_water_s: float,
-        preposition_s: float,
+        control: ControlConfig,
         on_fit: Callable[[FitResult], None] | None = None,
     ) -> None:
         self._area = area
@@ -57,9 +62,9 @@ class Background:
         self._setup = setup
         self._horizon_s = horizon_s
         self._low_water_s = low_water_s
-        self._preposition_s = preposition_s
+        self._control = control
         self._on_fit = on_fit
-        self._last_known_tai_s = spans_tai_s(setup.propagator)[-1][1]
+        self._spans_tai_s = spans_tai_s(setup.propagator)
         self._due = asyncio.Event()
         self._last_tai_s = -1e18
         self._has_asked = False
@@ -100,19 +105,18 @@ class Background:
             return False
         if not self._has_asked:
             return True
-        prediction = area.sky.prediction
         is_loss = before in AUTOTRACKING and area.state.track in HOLDING
         if is_loss:
             return True
         since_last_s = now_tai_s - self._last_tai_s
-        if prediction is None or prediction.end_tai_s - now_tai_s < self._low_water_s:
+        if not self._is_filled(now_tai_s, self._low_water_s):
             return since_last_s >= RETRY_S
         fewest = 1 if area.sky.fit else FIRST_FIT_COUNT
         return len(area.to_fit) >= fewest and since_last_s >= REFIT_PERIOD_S
 
     def _is_near(self, now_tai_s: float) -> bool:
         plan = self._area.sky.plan
-        return plan is not None and now_tai_s >= plan.rise_tai_s - self._preposition_s - REFIT_PERIOD_S
+        return plan is not None and now_tai_s >= plan.rise_tai_s - self._control.preposition_s - REFIT_PERIOD_S
 
     async def _refit(self) -> None:
         area = self._area
@@ -147,8 +151,7 @@ class Background:
     def _predict_here(self, now_tai_s: float, low_water_s: float | None = None) -> None:
         """Without the fit process: keep the buffer filled from the last fit, else the elements; 2 ms in the loop."""
         sky = self._area.sky
-        low_water_s = self._low_water_s if low_water_s is None else low_water_s
-        if sky.prediction is not None and sky.prediction.end_tai_s - now_tai_s > low_water_s:
+        if self._is_filled(now_tai_s, self._low_water_s if low_water_s is None else low_water_s):
             return
         request = self._request(now_tai_s, Readings.of([]))
         try:
@@ -168,14 +171,37 @@ class Background:
         return carried, Model.ELEMENTS if carried is None else Model.LAST_PASS
 
     def _request(self, now_tai_s: float, readings: Readings) -> RefitRequest:
-        start_tai_s = now_tai_s - PAST_S
-        known_s = self._last_known_tai_s - start_tai_s
+        past_s, ahead_s = self._reach_s(now_tai_s)
+        start_tai_s = now_tai_s - PAST_S - past_s
+        known_s = self._spans_tai_s[-1][1] - start_tai_s
         return RefitRequest(
             readings=readings,
             start_tai_s=start_tai_s,
-            horizon_s=max(min(self._horizon_s + PAST_S, known_s), LEAST_HORIZON_S),
+            horizon_s=max(min(self._horizon_s + PAST_S + past_s + ahead_s, known_s), LEAST_HORIZON_S),
             now_tai_s=now_tai_s,
-            near_az_deg=self._near_az_deg(start_tai_s),
+            near_az_deg=self._near_az_deg(now_tai_s),
+        )
+
+    def _is_filled(self, now_tai_s: float, low_water_s: float) -> bool:
+        """Whether the buffer holds so much ahead of now, and before it what a satellite that is late asks for."""
+        prediction = self._area.sky.prediction
+        past_s, ahead_s = self._reach_s(now_tai_s)
+        if prediction is None or prediction.end_tai_s - now_tai_s < low_water_s + ahead_s:
+            return False
+        return prediction.start_tai_s - REACH_SLACK_S <= now_tai_s - past_s
+
+    def _reach_s(self, now_tai_s: float) -> tuple[float, float]:
+        """How far before and beyond its time a path is looked up for a satellite that is late or early.
+
+        Less where an ephemeris has not so much.
+        """
+        if self._area.state.track not in BESIDE:
+            return 0.0, 0.0
+        reach_s = math.ceil(extents(self._area.sky.prediction, self._control)[0])
+        lead_in_s = PAST_S + longest_window_s(self._setup.azimuth)
+        start, end = next(((a, b) for a, b in self._spans_tai_s if a <= now_tai_s <= b), (now_tai_s, now_tai_s))
+        return min(reach_s, max(now_tai_s - lead_in_s - start, 0.0)), min(
+            reach_s, max(end - now_tai_s - self._horizon_s, 0.0)
         )
 
     def _near_az_deg(self, tai_s: float) -> float:

@@ -109,7 +109,7 @@ class Service:
             job.refit,
             horizon_s=job.horizon_s,
             low_water_s=job.low_water_s,
-            preposition_s=job.control.preposition_s,
+            control=job.control,
             on_fit=on_fit,
         )
         self._foreground = Foreground(
