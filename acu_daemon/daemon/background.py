@@ -207,7 +207,7 @@ class Background:
     def _near_az_deg(self, tai_s: float) -> float:
         """The turn on which the path continues: the last buffer's, but the antenna's while it tracks by itself."""
         state, sky = self._area.state, self._area.sky
-        if sky.plan is not None and tai_s < sky.plan.start_tai_s:
+        if sky.plan is not None and (sky.prediction is None or tai_s < sky.plan.start_tai_s):
             return sky.plan.start_az_deg
         point = sky.prediction.at(tai_s, follow=False) if sky.prediction else None
         if point is not None and abs(point.az_deg - state.az_deg) < 180.0:
