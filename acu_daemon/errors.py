@@ -3,8 +3,10 @@
 AcuDaemonError
 ├── UsageError              wrong use or configuration; exit status 2
 │   ├── ConfigError         a TOML file: says file, key, value, what was expected
-│   └── ElementsError       an element set: says file, line, reason
+│   ├── ElementsError       an element set: says file, line, reason
+│   └── AttitudeError       a satellite's attitude, from a file or a plan: says where and why
 ├── CampaignError           runs of a campaign failed; names them
+├── ProfileError            no tracking profile of a satellite's antenna keeps to margin, ranges and limits
 ├── OrbitError              a propagator has no answer (decayed, outside its span)
 ├── LinkError               the connection to the ACU failed
 │   └── LinkRefusedError    another client holds the ACU, or nobody listens
@@ -30,6 +32,14 @@ class ElementsError(UsageError):
 
 class CampaignError(AcuDaemonError):
     """Runs of a campaign failed; the message names them, and why."""
+
+
+class AttitudeError(UsageError):
+    """A satellite's attitude cannot be used; the message says where and why."""
+
+
+class ProfileError(AcuDaemonError):
+    """No tracking profile of a satellite's antenna keeps to margin, ranges and limits; the message says what would."""
 
 
 class OrbitError(AcuDaemonError):

@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from acu_daemon.errors import OrbitError
+from acu_daemon.errors import AttitudeError
 from acu_daemon.onboard.frames import body_from_lvlh
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.units import Array
@@ -27,7 +27,7 @@ class Attitude(Protocol):
         """Rotations (N, 3, 3) from LVLH to the body at the times (N,).
 
         lvlh_from_teme: (N, 3, 3) at the same times, for attitudes that are given in an inertial frame.
-        Raises:  OrbitError: a time that the attitude does not cover.
+        Raises:  AttitudeError: a time that the attitude does not cover.
         """
 
 
@@ -90,14 +90,14 @@ class AttitudePlan:
 def plan_attitude(holds: Sequence[Hold], agility: Agility) -> AttitudePlan:
     """Make a plan of holds in order of time; the time between two must suffice for the slew and settling.
 
-    Raises:  OrbitError: the holds overlap, are too near each other, or too far off nadir; says by how much.
+    Raises:  AttitudeError: the holds overlap, are too near each other, or too far off nadir; says by how much.
     """
     for hold in holds:
         if hold.end_tai_s < hold.start_tai_s:
-            raise OrbitError(f"attitude: the hold of {utc_text(hold.start_tai_s)} ends before it starts")
+            raise AttitudeError(f"attitude: the hold of {utc_text(hold.start_tai_s)} ends before it starts")
         for name, angle_deg in (("roll", hold.roll_deg), ("pitch", hold.pitch_deg)):
             if abs(angle_deg) > agility.max_angle_deg:
-                raise OrbitError(
+                raise AttitudeError(
                     f"attitude: the hold of {utc_text(hold.start_tai_s)} needs {angle_deg:.1f} deg of {name}; the body "
                     f"turns {agility.max_angle_deg:g} deg at the most: choose another time or target"
                 )
@@ -106,7 +106,7 @@ def plan_attitude(holds: Sequence[Hold], agility: Agility) -> AttitudePlan:
         needed_s = agility.slew_s(turn_deg) + agility.settle_s * (turn_deg > 0.0)
         there_s = following.start_tai_s - one.end_tai_s
         if there_s < needed_s or there_s <= 0.0:
-            raise OrbitError(
+            raise AttitudeError(
                 f"attitude: from {utc_text(one.end_tai_s)} to {utc_text(following.start_tai_s)} are {there_s:.1f} s; "
                 f"the slew of {turn_deg:.1f} deg takes {needed_s:.1f} s with settling: move the holds apart"
             )

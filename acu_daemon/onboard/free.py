@@ -10,14 +10,13 @@ from acu_daemon.onboard.bound import Bound, least_rate
 from acu_daemon.onboard.cone import Tube, azimuth_tube, elevation_interval, windings
 from acu_daemon.onboard.least_path import Band, Mask, least_path
 from acu_daemon.onboard.pointed import fit
-from acu_daemon.onboard.profile import Objective, Profile, Task, off_pointing, peak_rate_deg_s
+from acu_daemon.onboard.profile import Objective, Profile, Task, caps, off_pointing, peak_rate_deg_s
 from acu_daemon.onboard.quintic import Knots, Path
 from acu_daemon.onboard.view import PER_PLAN_STEP
 from acu_daemon.units import Array
 
 PIECES = ((20.0, 0.5), (20.0, 0.1), (10.0, 0.1), (5.0, 0.05))  # longest, s; and how near to the station it would stay
 AZIMUTH_GUARD, ELEVATION_GUARD = 0.995, 0.997  # of the margin, in plans: between the samples the paths bulge
-RATE_GUARD, ACCELERATION_GUARD = 0.999, 0.98  # of the drive's limits
 _GOOD_ENOUGH = 1.01  # times the bound: no finer pieces are tried
 _TURNS = (0, 1, -1, 2, -2)
 
@@ -146,11 +145,6 @@ def _elevation(task: Task, azimuth: Path, knots: Knots, goal: Mask) -> Path | No
     aim = goal if not goal.all() else np.zeros(goal.size, dtype=bool)
     band = Band(view.time_s, lower, upper, aim, *caps(limits))
     return least_path(band, knots, (lower + upper) / 2.0)
-
-
-def caps(limits: AxisLimits) -> tuple[float, float]:
-    """Rate and acceleration for a plan: a little less than allowed, between the samples they bulge."""
-    return RATE_GUARD * limits.max_rate_deg_s, ACCELERATION_GUARD * limits.max_acceleration_deg_s2
 
 
 def keeps_to_ranges(task: Task, profile: Profile) -> bool:

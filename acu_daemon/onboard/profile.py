@@ -17,6 +17,7 @@ from acu_daemon.units import Array
 
 Method = Literal["single", "three", "search", "free"]
 Objective = Literal["peak", "imaging"]
+RATE_GUARD, ACCELERATION_GUARD = 0.999, 0.98  # of the drive's limits, in plans: between the samples paths bulge
 METHODS: tuple[Method, ...] = ("single", "three", "search", "free")
 
 
@@ -69,3 +70,8 @@ def off_pointing(task: Task, gimbal: Gimbal, view: PassView) -> Array:
 def peak_rate_deg_s(path: Path, view: PassView) -> float:
     """The largest rate at 20 Hz."""
     return float(np.abs(path.value(view.time_s, 1)).max())
+
+
+def caps(limits: AxisLimits) -> tuple[float, float]:
+    """Rate and acceleration that plans keep to."""
+    return RATE_GUARD * limits.max_rate_deg_s, ACCELERATION_GUARD * limits.max_acceleration_deg_s2

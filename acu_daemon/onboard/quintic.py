@@ -8,6 +8,7 @@ high.
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import factorial
 
 import numpy as np
 import numpy.typing as npt
@@ -58,11 +59,15 @@ class Path:
     def knots(self) -> "Knots":
         return Knots(np.append(self.start_s, self.start_s[-1] + self.length_s[-1]))
 
-    def shifted(self, by_deg: float) -> "Path":
-        """The same path, its angle grown by a constant."""
-        coefficients = self.coefficients.copy()
-        coefficients[:, 0] += by_deg
-        return Path(self.start_s, self.length_s, coefficients)
+    def cut(self, start_s: Array, end_s: float) -> "Path":
+        """The same path in pieces that start at (M,) and end with the next one or at end_s; none may span a joint."""
+        piece = self.knots.piece_of(start_s)
+        offset = (start_s - self.start_s[piece])[:, None]
+        moved = [
+            (_derived(self.coefficients, k)[piece] * offset ** np.arange(6 - k)).sum(axis=1) / factorial(k)
+            for k in range(6)
+        ]
+        return Path(start_s, np.diff(np.append(start_s, end_s)), np.stack(moved, axis=1))
 
 
 def _derived(coefficients: Array, derivative: int) -> Array:

@@ -94,9 +94,13 @@ def view_pass(
     start_tai_s: float,
     end_tai_s: float,
 ) -> PassView:
-    """Sample a pass from start to end.  Raises: OrbitError: orbit or attitude have no answer for one of the times."""
-    steps = PER_PLAN_STEP * int(np.ceil((end_tai_s - start_tai_s) / (FINE_S * PER_PLAN_STEP)))
-    tai_s = np.linspace(start_tai_s, end_tai_s, steps + 1)
+    """Sample a pass from the first whole second after its start, as long as it lasts.
+
+    Raises:  OrbitError: orbit or attitude have no answer for one of the times.
+    """
+    first_tai_s = np.ceil(start_tai_s)
+    steps = PER_PLAN_STEP * int((end_tai_s - first_tai_s) / (FINE_S * PER_PLAN_STEP))
+    tai_s = first_tai_s + FINE_S * np.arange(steps + 1)
     return PassView(tai_s, *gimbal_from_itrs(propagator, attitude, mount, orientation, tai_s))
 
 

@@ -26,7 +26,7 @@ _FRAMES: tuple[tuple[str, Frame], ...] = (
     (r"GCRF\d?|ICRF\d?", "GCRF"),
     (r"ITRF-?(\d\d|\d{4})?|WGS84", "ITRF"),
 )
-_SUPPORTED_FRAMES = "TEME, TOD, EME2000, GCRF, ICRF, ITRF and ITRFyyyy"
+SUPPORTED_FRAMES = "TEME, TOD, EME2000, GCRF, ICRF, ITRF and ITRFyyyy"
 _OF_DATE = ("TEME", "TOD")
 _UNIFORM_MINUS_TAI_S = {"TAI": 0.0, "GPS": -19.0, "TT": 32.184}
 _SUPPORTED_TIMES = "UTC, TAI, TT, GPS"
@@ -92,15 +92,15 @@ def parse_oem(text: str, file: str) -> tuple[list[OemSegment], list[Problem]]:
 def _segment(raw: RawSegment, file: str) -> OemSegment:
     if raw.problem is not None:
         raise raw.problem
-    frame, system = _frame(raw), _time_system(raw)
+    frame, system = _frame(raw), time_system(raw)
     if len(raw.states) < _LEAST_STATES:
         raise BadSegmentError(f"{len(raw.states)} states in the segment, at least {_LEAST_STATES} are needed", raw.line)
-    tai_s = np.array([_tai_s(epoch, system, line) for line, epoch, _ in raw.states])
+    tai_s = np.array([epoch_tai_s(epoch, system, line) for line, epoch, _ in raw.states])
     falling = np.flatnonzero(np.diff(tai_s) <= 0.0)
     if falling.size:
         line, epoch, _ = raw.states[int(falling[0]) + 1]
         raise BadSegmentError(f"the times must rise, {epoch} does not", line)
-    states = np.array([_numbers(values, line) for line, _, values in raw.states]) * 1e3
+    states = np.array([numbers(values, line) for line, _, values in raw.states]) * 1e3
     start_tai_s, end_tai_s = _span_tai_s(raw, system, tai_s)
     return OemSegment(
         version=raw.version,
@@ -119,27 +119,34 @@ def _segment(raw: RawSegment, file: str) -> OemSegment:
 
 
 def _frame(raw: RawSegment) -> Frame:
-    centre = _field(raw, "CENTER_NAME")
+    centre = required(raw, "CENTER_NAME")
     if centre.upper() != "EARTH":
         raise BadSegmentError(f"CENTER_NAME is {centre[:40]!r}; only EARTH can be used", raw.line)
-    name = _field(raw, "REF_FRAME")
-    plain = name.upper().replace(" ", "")
-    frame = next((frame for pattern, frame in _FRAMES if re.fullmatch(pattern, plain)), None)
+    name = required(raw, "REF_FRAME")
+    frame = frame_named(name)
     if frame is None:
-        raise BadSegmentError(f"REF_FRAME is {name[:40]!r}; {_SUPPORTED_FRAMES} can be used", raw.line)
+        raise BadSegmentError(f"REF_FRAME is {name[:40]!r}; {SUPPORTED_FRAMES} can be used", raw.line)
     if frame in _OF_DATE and raw.fields.get("REF_FRAME_EPOCH"):
         raise BadSegmentError(f"REF_FRAME_EPOCH: {frame} can be used of date only, not of one epoch", raw.line)
     return frame
 
 
-def _time_system(raw: RawSegment) -> str:
-    system = _field(raw, "TIME_SYSTEM").upper()
+def frame_named(name: str) -> Frame | None:
+    """The frame that a message names, None for one that is not known here."""
+    plain = name.upper().replace(" ", "")
+    return next((frame for pattern, frame in _FRAMES if re.fullmatch(pattern, plain)), None)
+
+
+def time_system(raw: RawSegment) -> str:
+    """The segment's TIME_SYSTEM.  BadSegmentError: none, or one that is not known here."""
+    system = required(raw, "TIME_SYSTEM").upper()
     if system != "UTC" and system not in _UNIFORM_MINUS_TAI_S:
         raise BadSegmentError(f"TIME_SYSTEM is {system[:40]!r}; {_SUPPORTED_TIMES} can be used", raw.line)
     return system
 
 
-def _field(raw: RawSegment, key: str) -> str:
+def required(raw: RawSegment, key: str) -> str:
+    """A field of the metadata.  BadSegmentError: it is missing."""
     value = raw.fields.get(key, "")
     if not value:
         raise BadSegmentError(f"{key} is missing", raw.line)
@@ -150,9 +157,9 @@ def _span_tai_s(raw: RawSegment, system: str, tai_s: Array) -> tuple[float, floa
     """The useable span, within the states; without one, that of the states."""
     first, last = float(tai_s[0]), float(tai_s[-1])
     if start := raw.fields.get("USEABLE_START_TIME"):
-        first = max(first, _tai_s(start, system, raw.line))
+        first = max(first, epoch_tai_s(start, system, raw.line))
     if stop := raw.fields.get("USEABLE_STOP_TIME"):
-        last = min(last, _tai_s(stop, system, raw.line))
+        last = min(last, epoch_tai_s(stop, system, raw.line))
     if first >= last:
         raise BadSegmentError("USEABLE_START_TIME to USEABLE_STOP_TIME leaves nothing of the states", raw.line)
     return first, last
@@ -161,12 +168,12 @@ def _span_tai_s(raw: RawSegment, system: str, tai_s: Array) -> tuple[float, floa
 def _created_tai_s(raw: RawSegment) -> float | None:
     """None where the header has no such date, or no date that can be read."""
     try:
-        return _tai_s(raw.created, "UTC", raw.line)
+        return epoch_tai_s(raw.created, "UTC", raw.line)
     except BadSegmentError:
         return None
 
 
-def _tai_s(text: str, system: str, line: int) -> float:
+def epoch_tai_s(text: str, system: str, line: int) -> float:
     """Read YYYY-MM-DDThh:mm:ss[.fff][Z] or YYYY-DDDThh:mm:ss[.fff][Z]."""
     try:
         tai_s = tai_from_utc(_calendar(text).removesuffix("Z") + "Z")
@@ -193,7 +200,8 @@ def _calendar(text: str) -> str:
     return f"{found.isoformat()}{match[3]}"
 
 
-def _numbers(values: list[str], line: int) -> list[float]:
+def numbers(values: list[str], line: int) -> list[float]:
+    """Finite numbers.  BadSegmentError: a text that is none."""
     for text in values:
         if _NUMBER.fullmatch(text) is None or not isfinite(float(text)):
             raise BadSegmentError(f"{text[:40]!r} is not a number", line)

@@ -1,6 +1,6 @@
-"""The text of an orbit ephemeris message, KVN or XML: its segments, still as text, with the lines they stand in."""
+"""The text of a CCSDS ephemeris message, KVN or XML: its segments, still as text, with the lines they stand in."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 from xml.parsers import expat
@@ -28,12 +28,36 @@ class RawSegment:
     problem: BadSegmentError | None = None
 
 
-def read_segments(text: str) -> list[RawSegment]:
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """What differs between the kinds of messages."""
+
+    message: str  # the XML root
+    version_key: str
+    row: str  # the XML element that holds one epoch's values
+    row_text: str  # what a line of data is, in words
+    counts: tuple[int, ...]  # of values after the epoch in a line of KVN
+    kept: int  # the first of these
+    values: Callable[[Mapping[str, str]], list[str]]  # from the leaves of a row; KeyError: names what is missing
+
+
+OEM = Layout(
+    message="oem",
+    version_key="CCSDS_OEM_VERS",
+    row="stateVector",
+    row_text="a time with position and velocity (or accelerations too)",
+    counts=(6, 9),
+    kept=6,
+    values=lambda leaves: [leaves[key] for key in STATE_KEYS],
+)
+
+
+def read_segments(text: str, layout: Layout = OEM) -> list[RawSegment]:
     """Read the segments, KVN or XML as the first character says.  BadSegmentError: the whole file cannot be read."""
-    return _read_xml(text) if text.lstrip()[:1] == "<" else _read_kvn(text)
+    return _read_xml(text, layout) if text.lstrip()[:1] == "<" else _read_kvn(text, layout)
 
 
-def _read_kvn(text: str) -> list[RawSegment]:
+def _read_kvn(text: str, layout: Layout) -> list[RawSegment]:
     found: list[RawSegment] = []
     where: Literal["header", "meta", "data", "covariance"] = "header"
     version = created = ""
@@ -47,16 +71,18 @@ def _read_kvn(text: str) -> list[RawSegment]:
             where = "meta"
         elif word == "META_STOP":
             where = "data"
+        elif word in ("DATA_START", "DATA_STOP"):
+            continue
         elif word in ("COVARIANCE_START", "COVARIANCE_STOP"):
             where = "covariance" if word == "COVARIANCE_START" else "data"
-        elif word.startswith("CCSDS_OEM_VERS"):
+        elif word.startswith(layout.version_key):
             where, version, created = "header", line.partition("=")[2].strip(), ""
         elif where == "header" and word.startswith("CREATION_DATE"):
             created = line.partition("=")[2].strip()
         elif where == "meta":
             _take_field(found[-1], line, number)
         elif where == "data" and found:
-            _take_state(found[-1], line, number)
+            _take_state(found[-1], line, number, layout)
     return found
 
 
@@ -68,18 +94,18 @@ def _take_field(raw: RawSegment, line: str, number: int) -> None:
         raw.problem = raw.problem or BadSegmentError(f"{line[:40]!r} is not KEY = VALUE", number)
 
 
-def _take_state(raw: RawSegment, line: str, number: int) -> None:
+def _take_state(raw: RawSegment, line: str, number: int, layout: Layout) -> None:
     epoch, *values = line.split()
-    if len(values) in (6, 9):  # the last three are accelerations
-        raw.states.append((number, epoch, values[:6]))
+    if len(values) in layout.counts:
+        raw.states.append((number, epoch, values[: layout.kept]))
     else:
-        reason = f"{line[:40]!r} is not a time with position and velocity (or accelerations too)"
+        reason = f"{line[:40]!r} is not {layout.row_text}"
         raw.problem = raw.problem or BadSegmentError(reason, number)
 
 
-def _read_xml(text: str) -> list[RawSegment]:
+def _read_xml(text: str, layout: Layout) -> list[RawSegment]:
     """Follow the elements by expat, which knows the lines; a DOCTYPE or an entity's declaration ends it."""
-    reader = _XmlReader()
+    reader = _XmlReader(layout)
     try:
         reader.parser.Parse(text, True)
     except expat.ExpatError as error:
@@ -90,16 +116,17 @@ def _read_xml(text: str) -> list[RawSegment]:
 
 
 class _XmlReader:
-    """Collects metadata and state vectors of every segment.  Used once."""
+    """Collects metadata and the rows of every segment.  Used once."""
 
-    def __init__(self) -> None:
+    def __init__(self, layout: Layout) -> None:
+        self._layout = layout
         self.found: list[RawSegment] = []
         self.parser = expat.ParserCreate()
         self.parser.StartElementHandler = self._start
         self.parser.EndElementHandler = self._end
         self.parser.CharacterDataHandler = self._add_text
         self.parser.StartDoctypeDeclHandler = self._refuse
-        self._within = ""  # metadata or stateVector
+        self._within = ""  # metadata or a row
         self._line = 0
         self._text: list[str] = []
         self._leaves: dict[str, str] = {}
@@ -107,7 +134,7 @@ class _XmlReader:
         self._created = ""
 
     def _refuse(self, *_declaration: object) -> None:
-        reason = "a DOCTYPE or ENTITY declaration: an OEM has none, so the file is not read"
+        reason = "a DOCTYPE or ENTITY declaration: such a message has none, so the file is not read"
         raise BadSegmentError(reason, self.parser.CurrentLineNumber)
 
     def _start(self, tag: str, attributes: Mapping[str, str]) -> None:
@@ -115,11 +142,11 @@ class _XmlReader:
         self._text = []
         if name == "segment":
             self.found.append(RawSegment(self.parser.CurrentLineNumber, self._version, self._created))
-        elif name == "oem":
+        elif name == self._layout.message:
             self._version = attributes.get("version", "").strip()
         elif name == "header":
             self._created = ""
-        elif name in ("metadata", "stateVector"):
+        elif name in ("metadata", self._layout.row):
             self._within, self._leaves, self._line = name, {}, self.parser.CurrentLineNumber
 
     def _add_text(self, text: str) -> None:
@@ -130,7 +157,7 @@ class _XmlReader:
         if name == "CREATION_DATE":
             self._created = "".join(self._text).strip()
         if name != self._within:
-            self._leaves[name] = "".join(self._text).strip()
+            self._leaves.setdefault(name, "".join(self._text).strip())
             return
         self._within = ""
         if not self.found:
@@ -139,8 +166,8 @@ class _XmlReader:
         if name == "metadata":
             raw.fields = self._leaves
             return
-        missing = [key for key in ("EPOCH", *STATE_KEYS) if key not in self._leaves]
-        if missing:
-            raw.problem = raw.problem or BadSegmentError(f"a stateVector without {missing[0]}", self._line)
-        else:
-            raw.states.append((self._line, self._leaves["EPOCH"], [self._leaves[key] for key in STATE_KEYS]))
+        try:
+            raw.states.append((self._line, self._leaves["EPOCH"], self._layout.values(self._leaves)))
+        except KeyError as missing:
+            reason = f"a {self._layout.row} without {missing.args[0]}"
+            raw.problem = raw.problem or BadSegmentError(reason, self._line)
