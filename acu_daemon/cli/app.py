@@ -43,7 +43,14 @@ COMMANDS = {  # name: module of acu_daemon.cli, and the function in it
     "clear": ("hands", "clear"),
     "status": ("hands", "status"),
 }
-GROUPS: dict[str, Group] = {}
+GROUPS: dict[str, Group] = {
+    "groundtrack": Group(
+        "Keep a phased satellite's ground track: simulate it (seed 003), or see it in element sets and in passes.",
+        {
+            "simulate": ("groundtrack_simulate", "command"),
+        },
+    ),
+}
 HELP = """
     Assisted tracking: keeps an antenna on a low-orbit satellite when its signal is lost.
 

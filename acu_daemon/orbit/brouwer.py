@@ -119,8 +119,7 @@ class BrouwerPropagator:
         """
         if not np.isfinite(tai_s).all():
             raise OrbitError(f"{self.elements.name}: no position at a time that is not finite")
-        mean = self.mean_elements(tai_s)
-        return _state(*(_osculating_hill(mean) if self.short_period else _mean_hill(mean)))
+        return states_of_mean(self.mean_elements(tai_s), self.short_period)
 
     def mean_elements(self, tai_s: Array) -> OsculatingElements:
         """The mean elements with their secular motion at the times (N,)."""
@@ -138,6 +137,11 @@ class BrouwerPropagator:
     def corrected(self, correction: Correction) -> "BrouwerPropagator":
         """The same elements with this correction in place of any earlier one."""
         return BrouwerPropagator(self.elements, self.short_period, correction)
+
+
+def states_of_mean(mean: OsculatingElements, short_period: bool = True) -> tuple[Array, Array]:
+    """Positions (N, 3) in metres and velocities (N, 3) in m/s of mean elements, in their frame."""
+    return _state(*(_osculating_hill(mean) if short_period else _mean_hill(mean)))
 
 
 def _corrected(elements: BrouwerElements, correction: Correction) -> BrouwerElements:

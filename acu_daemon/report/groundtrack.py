@@ -1,0 +1,88 @@
+"""Pictures of ground-track keeping."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from acu_daemon.groundtrack.environment import EPOCH_TAI_S, STEP_S, Flux, even_steps
+from acu_daemon.groundtrack.simulate import Outcome
+from acu_daemon.units import DAY_S
+
+TRUE, SEEN, LIMIT, SIZE = "#0b6e4f", "#9aa5b1", "#c8553d", "#3d7ea6"
+_SHOWN_STEPS = 20  # one in an hour
+
+
+def plot_run(path: Path, outcome: Outcome) -> None:
+    """D over the year, and the manoeuvres below; writes a PNG."""
+    figure = _figure((10.0, 6.0))
+    case = outcome.case
+    figure.suptitle(
+        f"SIMULATION: {Path(case.profile).stem} profile, ±{case.band_m:g} m, controller {case.controller}, "
+        f"{len(outcome.flown.manoeuvres)} manoeuvres (bound {outcome.bound_count:.1f})",
+        fontweight="bold",
+    )
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
+    draw_drift(above, outcome)
+    draw_sizes(below, outcome)
+    below.set_xlabel("days")
+    figure.savefig(path)
+
+
+def draw_drift(axes: Axes, outcome: Outcome) -> None:
+    """True D, D as seen behind it, and the band."""
+    flown, thin = outcome.flown, slice(0, None, _SHOWN_STEPS)
+    days = flown.times_s[thin] / DAY_S
+    axes.plot(days, flown.seen_m[thin], color=SEEN, linewidth=0.6, label="as the navigator sees it")
+    axes.plot(days, flown.d_m[thin], color=TRUE, linewidth=1.0, label="true")
+    for limit_m in (-outcome.case.band_m, outcome.case.band_m):
+        axes.axhline(limit_m, color=LIMIT, linewidth=0.8, linestyle="--")
+    axes.set_ylabel("D, m (east positive)")
+    axes.legend(loc="lower right", fontsize=7, framealpha=0.8)
+
+
+def draw_sizes(axes: Axes, outcome: Outcome) -> None:
+    """Sizes of the manoeuvres over time."""
+    made = outcome.flown.manoeuvres
+    axes.vlines([one.time_s / DAY_S for one in made], 0.0, [one.delta_a_m for one in made], color=SIZE, linewidth=1.4)
+    axes.set_ylim(bottom=0.0)
+    axes.set_ylabel("Δa, m")
+
+
+def plot_profiles(path: Path, profiles: dict[str, Flux], days: float) -> None:
+    """Flux over the year (figure 3 of the paper); writes a PNG."""
+    figure = _figure((9.0, 4.0))
+    axes = figure.subplots()
+    at_days = np.arange(0.0, days, 0.5)
+    for (name, flux), colour in zip(profiles.items(), (TRUE, LIMIT, SIZE), strict=False):
+        activity = flux.at(even_steps(EPOCH_TAI_S, DAY_S / 2.0, at_days.size))
+        axes.plot(at_days, activity.f107, color=colour, linewidth=1.2, label=name)
+        axes.plot(at_days, activity.f107_mean, color=colour, linewidth=0.8, linestyle=":")
+    axes.axhspan(-100.0, 65.0, color="#eeeeee", zorder=0)
+    axes.set_ylim(-80.0, 320.0)
+    axes.set_xlabel("days")
+    axes.set_ylabel("F10.7, sfu (dotted: mean over 81 days; grey: no real sun)")
+    axes.legend(fontsize=8)
+    figure.savefig(path)
+
+
+def plot_windows(path: Path, raw_m: Sequence[float], smoothed: dict[str, Sequence[float]]) -> None:
+    """Raw D and its smoothed values with a small and a big window (figure 2 of the paper); writes a PNG."""
+    figure = _figure((9.0, 4.0))
+    axes = figure.subplots()
+    days = even_steps(0.0, STEP_S / DAY_S, len(raw_m))
+    axes.plot(days, raw_m, ".", color=SEEN, markersize=1.5, label="raw")
+    for (label, values), colour in zip(smoothed.items(), (SIZE, LIMIT, TRUE), strict=False):
+        axes.plot(days, values, color=colour, linewidth=1.2, label=label)
+    axes.set_xlabel("days")
+    axes.set_ylabel("D, m")
+    axes.legend(fontsize=8)
+    figure.savefig(path)
+
+
+def _figure(size_in: tuple[float, float]) -> Figure:
+    mpl.rcParams.update({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False})
+    return Figure(figsize=size_in, dpi=120, layout="constrained")
