@@ -46,8 +46,8 @@ def codec(data: bytes) -> None:
     heard = [event for _ in range(LONGEST_FRAME // len(good) + 2) for event in whole.feed(good)]
     assert heard[-1].reply == STATUS, "no resynchronisation within the longest frame"
     host = HostExchange()
-    host.begin(Poll())
-    host.receive(data)
+    host.begin(Poll(), 0.0)
+    host.receive(data, 0.0)
     commands = CommandDecoder(gap_s=1e9)
     for event in commands.feed(data, 0.0):
         if event.command is not None:

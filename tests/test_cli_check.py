@@ -14,6 +14,7 @@ from command_line import Done, acu_daemon
 from config_files import BROUWER, STATION, from_file, replaced, write
 
 from acu_daemon.cli import check
+from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.state import SNAPSHOT
 from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.protocol.messages import (
@@ -79,8 +80,8 @@ def acu(status: Status | None = READY, identity: Identity = PLAIN, faults: Fault
         made.close()
 
 
-class SetClock:
-    """Stands at an instant of the test."""
+class SetClock(SystemClock):
+    """Its UTC stands at an instant of the test."""
 
     utc = "1989-02-01T00:00:00Z"
 
@@ -201,8 +202,7 @@ def test_a_port_that_nobody_listens_on_is_no_go(tmp_path: Path) -> None:
     )
 
 
-def test_a_line_that_nobody_answers_on_is_no_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(check, "REPLY_S", 0.05)
+def test_a_line_that_nobody_answers_on_is_no_go(tmp_path: Path) -> None:
     with acu(status=None) as small:
         done = acu_daemon("check", "--config", write(tmp_path, station(small.url), scd=BROUWER))
     assert done.code == 1

@@ -445,7 +445,7 @@ def test_a_stop_in_mid_pass_leaves_the_acu_in_standby(losses: list[tuple[float, 
     assert flight.outcome.reason == "SIGTERM"
     assert flight.outcome.is_stopped
     assert [command for _, command in flight.commands[-2:]] == [Stop(), WriteParameter("W", 0)]
-    assert isinstance(flight.commands[-3][1], WriteAndPoll)
+    assert flight.commands[-3][1] == Poll()
     assert flight.rows[-1].mode is AcuMode.STANDBY or flight.commands[-1][0] < T + 15.2
 
 

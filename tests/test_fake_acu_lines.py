@@ -35,10 +35,10 @@ def fake_acu(latency_s: float = LATENCY_S) -> FakeAcu:
 
 
 async def ask(link: Link, host: HostExchange, command: Command) -> Reply:
-    link.write(host.begin(command))
+    link.write(host.begin(command, 0.0))
     while True:
         data, _ = await link.read()
-        if (reply := host.receive(data)) is not None:
+        if (reply := host.receive(data, 0.0)) is not None:
             return reply
 
 
@@ -89,7 +89,7 @@ def test_the_answer_to_a_command_takes_the_time_of_the_wire_and_the_latency() ->
         link = MemoryLink(fake_acu(), clock, BYTE_S)
         await link.open()
         host = HostExchange()
-        link.write(host.begin(WriteAndPoll(30.0, 40.0)))
+        link.write(host.begin(WriteAndPoll(30.0, 40.0), 0.0))
         _, first_s = await link.read()
         await link.read()
         return first_s, clock.monotonic_s(), link.byte_time_s
@@ -141,11 +141,11 @@ def test_a_status_is_of_the_moment_its_command_is_executed() -> None:
         await link.open()
         host = HostExchange()
         await ask(link, host, Poll())
-        link.write(host.begin(Poll()))
+        link.write(host.begin(Poll(), 0.0))
         await asyncio.sleep(0.005)
         assert isinstance(acu.parts.sky, Star)
         acu.parts.sky.is_on = False
-        reply = host.receive((await link.read())[0])
+        reply = host.receive((await link.read())[0], 0.0)
         assert isinstance(reply, Status)
         return reply.is_acquired
 

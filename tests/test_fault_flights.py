@@ -75,13 +75,20 @@ def test_p6_no_passing_fault_latches_an_axis(name: str) -> None:
     assert "axis.latched" not in measure(name).events
 
 
-@pytest.mark.parametrize("name", ["no-reply 3 in 10", "late-reply", "shifted", "bad-checksum", "truncated"])
+@pytest.mark.parametrize("name", ["no-reply 3 in 10", "late-reply 3 in 10", "bad-checksum", "truncated"])
 def test_a_line_that_garbles_or_loses_replies_is_an_alarm_until_it_is_good_again(name: str) -> None:
     flight = flown(name)
     assert [len(events_named(flight, event)) for event in ("link.poor", "link.good")] == [1, 1]
     alarmed = [seen.tai_s - T for seen in flight.snapshots if "bad replies" in seen.line_alarm]
     assert FAULT_S < alarmed[0] < FAULT_S + 3.0
     assert alarmed[-1] < FAULT_S + 9.0
+
+
+@pytest.mark.parametrize("name", ["late-reply", "shifted"])
+def test_a_line_whose_replies_are_all_late_says_how_late_they_are(name: str) -> None:
+    problems = {seen.link_problem for seen in flown(name).snapshots if T + FAULT_S + 1.5 < seen.tai_s < T + WIRE_S}
+    assert all("too late: up to" in text and "after the command, 90 are allowed" in text for text in problems if text)
+    assert any(problems)
 
 
 def test_every_verb_of_the_vocabulary_is_flown() -> None:

@@ -45,9 +45,9 @@ class Bench:
         """Open, if need be, and ask once."""
         host = HostExchange()
         async with asyncio.timeout(PATIENCE_S):
-            self.link.write(host.begin(Poll()))
+            self.link.write(host.begin(Poll(), 0.0))
             while True:
-                reply = host.receive((await self.link.read())[0])
+                reply = host.receive((await self.link.read())[0], 0.0)
                 if isinstance(reply, Status):
                     return reply
 

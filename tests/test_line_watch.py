@@ -11,7 +11,7 @@ from acu_daemon.daemon.line_watch import LineWatch
 
 def looks(*garbled_counts: int | None) -> list[bool]:
     """Whether there is an alarm, second after second; a count is of its connection, None: the link is down."""
-    port: Any = SimpleNamespace(is_up=True, failed_exchange_count=0, garbled_count=0, discarded_count=0)
+    port: Any = SimpleNamespace(is_up=True, failed_exchange_count=0, garbled_count=0, discarded_count=0, late_count=0)
     doubt: Any = SimpleNamespace(count=0)
     watch, alarms = LineWatch(port, doubt), []
     for count in garbled_counts:
@@ -27,9 +27,9 @@ def looks(*garbled_counts: int | None) -> list[bool]:
         ((0, 1, 2, 2, 2, 2, 2, 2), [False] * 8),
         ((0, 3, 3, 3, 3, 3, 3), [False, True, True, True, True, True, False]),
         ((0, 9, None, 0, 1), [False, True, False, False, False]),
-        ((50, 59, 0, 0, 3), [False, True, False, False, True]),
+        ((50, 59, None, 59, 62), [False, True, False, False, True]),
     ],
-    ids=["one now and then", "three, then none", "a lost link", "another connection between two looks"],
+    ids=["one now and then", "three, then none", "a lost link", "another connection, that counts on"],
 )
 def test_bad_replies_are_an_alarm_until_there_were_none_for_five_seconds(
     garbled_counts: tuple[int | None, ...], alarms: list[bool]

@@ -20,6 +20,7 @@ from acu_daemon.protocol.messages import (
     Identity,
     Nak,
     Poll,
+    ReadFaults,
     ReadParameter,
     ReadRegisters,
     Reply,
@@ -223,50 +224,90 @@ class Acu:
 def test_two_ends_back_to_back_understand_each_other(places: list[int]) -> None:
     host, acu = HostExchange(), Acu()
     for command in (Identify(), Poll(), WriteAndPoll(370.0, 45.0, 3), SelectMode(AcuMode.REMOTE)):
-        answer = acu.answer(host.begin(command))
-        replies = [reply for piece in cut(answer, places) if (reply := host.receive(piece)) is not None]
+        answer = acu.answer(host.begin(command, 0.0))
+        replies = [reply for piece in cut(answer, places) if (reply := host.receive(piece, 0.0)) is not None]
         assert replies == [acu.reply_of.get(0x31 if isinstance(command, Poll) else answer[2], Ack())]
         assert not host.is_outstanding
     assert acu.heard[2] == WriteAndPoll(azimuth_deg(azimuth_code(10.0)), 45.0, 3)
 
 
-def test_a_late_reply_is_not_taken_for_the_next_one() -> None:
+def test_a_late_reply_is_not_taken_for_the_next_one_but_its_lateness_known() -> None:
     host = HostExchange()
-    host.begin(WriteAndPoll(1.0, 2.0))
-    host.fail()
+    host.begin(WriteAndPoll(1.0, 2.0), 10.0)
+    host.fail(10.09)
     assert host.must_poll
-    host.begin(Poll())
-    assert host.receive(encode_reply(0x41, STATUS)) is None
-    assert host.discarded_count == 1
-    assert host.receive(encode_reply(0x31, STATUS)) == STATUS
+    host.begin(Poll(), 10.1)
+    assert host.receive(encode_reply(0x41, STATUS), 10.13) is None
+    assert (host.discarded_count, host.late_count, host.late_s) == (1, 1, pytest.approx(0.13))
+    assert host.receive(encode_reply(0x31, STATUS), 10.14) == STATUS
+    assert host.is_sure
     assert not host.must_poll
+
+
+def test_after_a_failed_poll_come_identify_read_registers_and_fault_detail_in_turn() -> None:
+    """ICD section 1, version 2."""
+    host, asked = HostExchange(), []
+    for tick in range(8):
+        now_s = 0.1 * tick
+        command = host.question(now_s) if tick else WriteAndPoll(1.0, 2.0)
+        asked.append(command)
+        if command is not None:
+            host.begin(command, now_s)
+            host.fail(now_s + 0.09)
+    questions = [Poll(), Identify(), ReadRegisters(), ReadFaults()]
+    assert asked == [WriteAndPoll(1.0, 2.0), *questions, None, None, Poll()]
+    assert host.free_s == pytest.approx(0.2 + 0.09 + 0.5)
+
+
+def test_an_answer_is_unsure_while_a_reply_to_an_earlier_command_of_its_kind_may_come() -> None:
+    host = HostExchange()
+    host.begin(WriteAndPoll(1.0, 2.0), 0.0)
+    host.fail(0.09)
+    host.begin(Poll(), 0.1)
+    assert host.receive(encode_reply(0x31, STATUS), 0.11) == STATUS
+    for now_s, is_sure in ((0.2, False), (0.5, False), (0.6, True)):
+        host.begin(WriteAndPoll(1.0, 2.0), now_s)
+        assert host.receive(encode_reply(0x41, STATUS), now_s + 0.01) == STATUS
+        assert host.is_sure == is_sure
+
+
+def test_what_arrives_while_nothing_is_asked_is_discarded_and_counted() -> None:
+    host = HostExchange()
+    host.begin(Poll(), 0.0)
+    host.fail(0.09)
+    assert host.receive(encode_reply(0x31, STATUS), 0.095) is None
+    assert (host.discarded_count, host.late_count, host.must_poll) == (1, 1, True)
 
 
 def test_the_second_half_of_a_late_reply_is_not_taken_for_the_next_one() -> None:
     host = HostExchange()
     late = encode_reply(0x31, STATUS)
-    host.begin(Poll())
-    assert host.receive(late[:10]) is None
-    host.fail()
-    host.begin(Poll())
-    assert host.receive(late[10:]) is None
+    host.begin(Poll(), 0.0)
+    assert host.receive(late[:10], 0.08) is None
+    host.fail(0.09)
+    host.begin(Identify(), 0.1)
+    assert host.receive(late[10:], 0.11) is None
     assert host.is_outstanding
 
 
-def test_after_a_failed_exchange_only_a_poll_is_accepted() -> None:
+def test_after_a_failed_exchange_only_a_free_question_is_accepted() -> None:
     host = HostExchange()
-    host.begin(Stop())
+    host.begin(Stop(), 0.0)
     with pytest.raises(RuntimeError, match="outstanding"):
-        host.begin(Poll())
-    host.fail()
-    with pytest.raises(RuntimeError, match="next command is a Poll"):
-        host.begin(Stop())
+        host.begin(Poll(), 0.01)
+    host.fail(0.09)
+    with pytest.raises(RuntimeError, match="Poll or another free question, not Stop"):
+        host.begin(Stop(), 1.0)
+    host.begin(Poll(), 1.0)
+    host.fail(1.09)
+    with pytest.raises(RuntimeError, match="free question, not Poll"):
+        host.begin(Poll(), 1.1)
 
 
 def test_a_reply_from_another_address_is_garble_not_an_answer() -> None:
     host = HostExchange()
-    host.begin(Poll())
-    assert host.receive(encode_reply(0x31, STATUS, ord("2"))) is None
+    host.begin(Poll(), 0.0)
+    assert host.receive(encode_reply(0x31, STATUS, ord("2")), 0.01) is None
     assert (host.garbled_count, host.is_outstanding) == (1, True)
 
 

@@ -30,6 +30,7 @@ from acu_daemon.protocol.status_block import decode_status
 
 CONFIG = ControlConfig(AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0))
 AZ_DEG, EL_DEG = 22464 * LSB_DEG, 10322 * LSB_DEG  # angles an encoder can show, near 123.4 and 56.7
+NOW = 1000.0  # TAI
 READS = (Identify, ReadRegisters, ReadParameter)
 
 
@@ -77,7 +78,7 @@ def standing(az_deg: float = AZ_DEG, el_deg: float = EL_DEG, *, is_remote_enable
 
 
 def step(state: ControlState, reply: Reply | None, command: Command) -> ControlState:
-    return replace(after_reply(state, Exchange(command, reply), CONFIG, []), last_extra=command)
+    return replace(after_reply(state, Exchange(command, reply), NOW, CONFIG, []), last_extra=command)
 
 
 def start(state: ControlState, acu: SmallAcu, config: ControlConfig = CONFIG, limit: int = 20) -> ControlState:
@@ -205,8 +206,8 @@ def test_a_refused_write_never_counts_as_done() -> None:
 def test_a_reply_to_another_question_moves_nothing() -> None:
     for stage in Stage:
         state = replace(standing(), stage=stage)
-        assert after_reply(state, Exchange(ReadParameter("A"), Parameter("A", 0)), CONFIG, []) == state
-        assert after_reply(state, Exchange(Identify(), Nak()), CONFIG, []) == state
+        assert after_reply(state, Exchange(ReadParameter("A"), Parameter("A", 0)), NOW, CONFIG, []) == state
+        assert after_reply(state, Exchange(Identify(), Nak()), NOW, CONFIG, []) == state
 
 
 def test_when_it_is_ready_it_asks_for_nothing() -> None:
@@ -230,6 +231,6 @@ LATCHED = ControlState(latch="azimuth stands still away from its command", is_st
 def test_a_rehearsal_gets_on_only_with_an_acu_that_surely_is_simulated(identities: list[str], stage: Stage) -> None:
     state, config = LATCHED, replace(CONFIG, is_rehearsal=True)
     for variant in identities:
-        state = after_reply(state, Exchange(Identify(), Identity("3842", variant)), config, [])
+        state = after_reply(state, Exchange(Identify(), Identity("3842", variant)), NOW, config, [])
     assert state.stage is stage
     assert last_command(replace(state, status=status()), config) == (Stop() if stage is Stage.IDENTIFIED else None)

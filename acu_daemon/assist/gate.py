@@ -13,6 +13,7 @@ from acu_daemon.model import AxisLimits, Reading, Readings
 from acu_daemon.units import wrap_180
 
 DWELL = "not acquired for the dwell time yet"
+OUT_OF_STEP = "perhaps the reply to an earlier command: the line is out of step"
 ABOVE_MAX_ELEVATION = "above the highest elevation for fits"
 TOO_FAST = "faster than the axis can move"
 OUTLIER = "far from the prediction of the fit"

@@ -23,10 +23,12 @@ from acu_daemon.cli.options import (
     parse_utc,
 )
 from acu_daemon.config import load_station, satellite_names
+from acu_daemon.config_tables import AcuSection
 from acu_daemon.control.plan import plan_pass
+from acu_daemon.daemon.port import AcuPort
 from acu_daemon.edge.clock import SystemClock, is_clock_synchronised
 from acu_daemon.edge.latch import ADVICE, DISARMED, LATCH
-from acu_daemon.edge.link import check_rate, make_link, open_once
+from acu_daemon.edge.link import check_rate, make_link
 from acu_daemon.edge.state import SNAPSHOT, state_directory, state_path
 from acu_daemon.errors import AcuDaemonError, LinkError, OrbitError, UsageError
 from acu_daemon.model import Site
@@ -34,12 +36,11 @@ from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.sun import RISEN_EL_DEG, sun_direction_deg
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.orbit.visibility import why_none
-from acu_daemon.protocol.exchange import HostExchange
-from acu_daemon.protocol.messages import AcuMode, Command, Faults, Identify, Identity, Poll, ReadFaults, Reply, Status
+from acu_daemon.protocol.messages import AcuMode, Faults, Identify, Identity, ReadFaults, Reply, Status
 from acu_daemon.protocol.sa3842 import address_byte
 from acu_daemon.units import DAY_S, wrap_180
 
-REPLY_S = 0.5
+ACU_S = 3.0  # for all that is asked of it: a reply or two may be lost
 HEALTHY_AGE_S = 5.0
 GO, WARN, NO_GO = "GO", "WARN", "NO-GO"
 
@@ -108,7 +109,7 @@ def _findings(config: Path, satellite: str | None, now_tai_s: float, state: Path
     except UsageError as error:
         yield Finding(NO_GO, "line rate", str(error))
         return
-    yield from asyncio.run(_acu(station.acu.url, address_byte(station.acu.address)))
+    yield from asyncio.run(_acu(station.acu))
 
 
 def place_text(site: Site, now_tai_s: float) -> str:
@@ -218,39 +219,33 @@ def _next_pass(name: str, target: Target, now_tai_s: float) -> Iterator[Finding]
         yield Finding(GO, f"{name}: cable wrap", f"the pass is held from azimuth {plan.start_az_deg:.1f} deg on")
 
 
-async def _acu(url: str, address: int) -> list[Finding]:
+async def _acu(acu: AcuSection) -> list[Finding]:
     """Ask identity, status and faults: nothing that moves or changes the ACU."""
-    link = make_link(url)
-    exchange = HostExchange(address)
-
-    async def ask(request: Command) -> Reply | None:
-        link.write(exchange.begin(request))
-        try:
-            async with asyncio.timeout(REPLY_S):
-                while True:
-                    data, _ = await link.read()
-                    reply = exchange.receive(data)
-                    if reply is not None:
-                        return reply
-        except TimeoutError:
-            exchange.fail()
-            return None
-
+    link, clock = make_link(acu.url), SystemClock()
+    port = AcuPort(link, clock, address_byte(acu.address), acu.period_s, acu.device_delay_s)
     try:
-        await open_once(link)
-        status = await ask(Poll())
-        if not isinstance(status, Status):
-            why = f"{link.description} is open, but no ACU answers: check address and baud rate"
-            return [Finding(NO_GO, "ACU", why)]
-        identity, faults = await ask(Identify()), await ask(ReadFaults())
+        await port.open(tries_all=True)
+        async with asyncio.timeout(ACU_S):
+            first = port.take_first()
+            status = first.reply if first and isinstance(first.reply, Status) else await port.status()
+            identity, faults = await port.reply_to(Identify()), await port.reply_to(ReadFaults())
     except LinkError as error:
         return [Finding(NO_GO, "ACU", str(error))]
+    except TimeoutError:
+        why = port.problem or f"{port.failed_exchange_count} replies were missing or late"
+        return [Finding(NO_GO, "ACU", f"{link.description}: {why}: look at the line")]
     finally:
         await link.close()
-    return list(_acu_findings(status, identity, faults))
+        clock.close()
+    findings = list(_acu_findings(status, identity, faults))
+    if port.failed_exchange_count:
+        late = f" {port.late_count} came too late, {port.lateness}:" if port.late_count else ""
+        lost = f"{port.failed_exchange_count} had no answer in time;{late} look at the line, `latency-test` measures it"
+        findings.append(Finding(WARN, "ACU replies", lost))
+    return findings
 
 
-def _acu_findings(status: Status, identity: Reply | None, faults: Reply | None) -> Iterator[Finding]:
+def _acu_findings(status: Status, identity: Reply, faults: Reply) -> Iterator[Finding]:
     who = str(identity) if isinstance(identity, Identity) else "does not identify itself"
     yield Finding(
         GO,

@@ -19,6 +19,7 @@ import typer
 from acu_daemon.cli.options import Target, coming_pass, load_target
 from acu_daemon.cli.run import make_job
 from acu_daemon.daemon.live import LiveLine
+from acu_daemon.daemon.port import AcuPort
 from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.edge.child_process import start_python
@@ -31,8 +32,7 @@ from acu_daemon.edge.signals import take_signals
 from acu_daemon.errors import AcuDaemonError, UsageError
 from acu_daemon.model import sky_angle_deg
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
-from acu_daemon.protocol.exchange import HostExchange
-from acu_daemon.protocol.messages import AcuMode, Backup, Command, Poll, SelectBackup, SelectMode
+from acu_daemon.protocol.messages import AcuMode, Backup, SelectBackup, SelectMode
 from acu_daemon.protocol.sa3842 import DEFAULT_ADDRESS
 from acu_daemon.report.trace import Figures, measure, read_trace
 from acu_daemon.sim.build import make_sky
@@ -189,25 +189,18 @@ def _beam_error_deg(seen: Snapshot, sky: Sky) -> float | None:
 
 async def _rate_memory(url: str) -> None:
     """The rival: select rate memory and autotrack, then only look on."""
-    link = make_link(url)
-    exchange = HostExchange(DEFAULT_ADDRESS)
-    await link.open()
-    wanted: list[Command] = [SelectBackup(Backup.RATE), SelectMode(AcuMode.AUTOTRACK)]
+    link, clock = make_link(url), SystemClock()
+    port = AcuPort(link, clock, DEFAULT_ADDRESS, 0.1, 0.0)
     try:
+        await port.open()
+        for wanted in (SelectBackup(Backup.RATE), SelectMode(AcuMode.AUTOTRACK)):
+            await port.reply_to(wanted)
         while True:
-            request: Command = Poll() if exchange.must_poll or not wanted else wanted[0]
-            link.write(exchange.begin(request))
-            try:
-                async with asyncio.timeout(0.09):
-                    while exchange.receive((await link.read())[0]) is None:
-                        pass
-                if wanted and request is wanted[0]:
-                    wanted.pop(0)
-            except TimeoutError:
-                exchange.fail()
+            await port.ask()
             await asyncio.sleep(0.1)
     finally:
         await link.close()
+        clock.close()
 
 
 def _report(out: Path) -> Figures:

@@ -179,6 +179,7 @@ def _link(trial: Trial, station: StationFile | None, link: Link | None) -> Itera
     asked_count = trips_ms.size + trial.lost_poll_count
     detail = f"{link.description}: {p50_ms:.2f} / {p99_ms:.2f} / {trips_ms[-1]:.2f} ms (50 %, 99 %, max)"
     detail += f", {trial.lost_poll_count} of {asked_count} polls lost"
+    detail += trial.late and f", replies {trial.late}"
     lost_share = trial.lost_poll_count / asked_count
     verdict = NO_GO if lost_share > LOST_SHARE else WARN if lost_share else GO
     yield Finding(verdict, "link", detail + (": look at cable, ground and baud rate" if lost_share else ""))

@@ -13,15 +13,13 @@ from acu_daemon.cli.options import Config
 from acu_daemon.config import load_station
 from acu_daemon.config_tables import StationFile
 from acu_daemon.daemon.port import AcuPort
-from acu_daemon.daemon.stopping import stop_antenna
+from acu_daemon.daemon.stopping import DEADLINE_S, stop_antenna
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.link import make_link
 from acu_daemon.edge.logs import configure_logs
 from acu_daemon.errors import NoAcuError
-from acu_daemon.protocol.messages import Poll, Status
 from acu_daemon.protocol.sa3842 import address_byte
 
-DEADLINE_S = 5.0
 NOT_RESTARTED = "2"  # RestartPreventExitStatus= of the unit: a refused configuration
 FINAL = "final"  # the file in $RUNTIME_DIRECTORY that says: this stop was asked for, nothing starts again after it
 
@@ -70,16 +68,13 @@ async def _stop(station: StationFile) -> bool:
     configure_logs(clock.tai_s, tags={}, is_terminal=sys.stdout.isatty())
     acu = station.acu
     port = AcuPort(make_link(acu.url), clock, address_byte(acu.address), acu.period_s, acu.device_delay_s)
-    keeper = asyncio.create_task(port.keep())
+    begun_s, keeper = clock.monotonic_s(), asyncio.create_task(port.keep())
     try:
         async with asyncio.timeout(DEADLINE_S):
             await port.wait_until_up()
-            answer = await port.exchange(Poll())
-            while not isinstance(answer.reply, Status):
-                await port.idle_gap()
-                answer = await port.exchange(Poll())
-            clears_watchdog = station.safety.register_watchdog_s > 0.0
-            return await stop_antenna(port, answer.reply, clears_watchdog=clears_watchdog)
+        clears_watchdog = station.safety.register_watchdog_s > 0.0
+        left_s = DEADLINE_S + begun_s - clock.monotonic_s()
+        return await stop_antenna(port, left_s, clears_watchdog=clears_watchdog)
     except TimeoutError:
         why = port.problem or "no answer"
         raise NoAcuError(f"no ACU within {DEADLINE_S:g} s: {why}; look at the antenna") from None

@@ -26,12 +26,13 @@ def absorb(
         state = _absorb_refusal(state, now_tai_s, events)
     if seen.status is not None and seen.reading is not None:
         state = _absorb_in_force(state, seen)
-        state = _absorb_reading(state, seen.status, seen.reading, config, is_confirmed=seen.is_confirmed)
+        state = _absorb_reading(state, seen, seen.status, seen.reading, config)
+    if seen.status is not None and seen.reading is not None and seen.is_in_step:
         is_ours = is_acquired(seen.status) and state.track in AUTOTRACKING
         path = sky.prediction.at(seen.reading.tai_s) if sky.prediction and is_ours else None
         state = _absorb_encoders(state, path, seen.status, seen.reading, events)
     if seen.extra is not None:
-        state = after_reply(state, seen.extra, config, events)
+        state = after_reply(state, seen.extra, now_tai_s, config, events)
         if isinstance(seen.extra.reply, Nak) and not isinstance(seen.extra.command, Stop):
             state = changed(state, extra_after_tai_s=now_tai_s + REFUSED_EXTRA_S)
     return state
@@ -67,17 +68,18 @@ def _absorb_encoders(
 
 
 def _absorb_reading(
-    state: ControlState, status: Status, reading: Reading, config: ControlConfig, *, is_confirmed: bool
+    state: ControlState, seen: Observation, status: Status, reading: Reading, config: ControlConfig
 ) -> ControlState:
     az_deg = encoder_continuous(status.az_deg, status.is_sector_high, config.azimuth)
-    state = _learn_lag(state, az_deg, status.el_deg)
+    if seen.is_in_step:
+        state = _learn_lag(state, az_deg, status.el_deg)
     return changed(
         state,
         stage=_stage_after(state, status),
         watchdog=_watchdog_after(state, status),
         status=status,
         reading=reading,
-        is_place_sure=is_confirmed,
+        is_place_sure=seen.is_confirmed,
         az_deg=az_deg,
         track_of_readings=(*state.track_of_readings[1 - RATE_READINGS :], (reading.tai_s, az_deg, status.el_deg)),
         is_stow_kept=_is_stow_kept(state, status),

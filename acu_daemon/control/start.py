@@ -28,7 +28,7 @@ from acu_daemon.units import wrap_180
 SECTOR = "S"  # the ACU's sector preference; 0: a register is followed the nearest way (ICD section 4)
 WATCHDOG = "W"  # the ACU's register watchdog: unwritten registers that are followed put it in STANDBY
 WATCHDOG_LSB_S = 0.02  # ICD section 3
-WATCHDOG_TRIES = 6  # exchanges without the reply that was hoped for, until the ACU counts as having no watchdog
+WATCHDOG_TRY_S = 2.0  # without the answer that is hoped for, and the ACU counts as having no watchdog
 
 
 def next_command(state: ControlState, config: ControlConfig) -> Command | None:
@@ -65,7 +65,9 @@ def _present(state: ControlState, config: ControlConfig) -> tuple[float, float]:
     )
 
 
-def after_reply(state: ControlState, extra: Exchange, config: ControlConfig, events: list[Event]) -> ControlState:
+def after_reply(
+    state: ControlState, extra: Exchange, now_tai_s: float, config: ControlConfig, events: list[Event]
+) -> ControlState:
     """Advance by the reply of an extra exchange; a missing or unexpected reply leaves the stage as it is."""
     command, reply = extra.command, extra.reply
     is_refused = isinstance(reply, Nak) and state.status is not None and state.status.is_remote_enabled
@@ -73,7 +75,7 @@ def after_reply(state: ControlState, extra: Exchange, config: ControlConfig, eve
         case (_, Stop(), Ack()):
             return changed(state, is_stop_due=False, watchdog=_perhaps_set(state, config))
         case (_, ReadParameter("W") | WriteParameter("W"), _):
-            return _after_watchdog(state, extra, config, events, is_refused=is_refused)
+            return _after_watchdog(state, extra, now_tai_s, config, events, is_refused=is_refused)
         case (Stage.READY, SelectBackup(), Ack()) if state.watchdog is Watchdog.SET:
             return changed(state, watchdog=Watchdog.UNKNOWN)  # a backup to select may come from a power cycle
         case (Stage.NEW, Identify(), Identity() as identity):
@@ -114,20 +116,26 @@ def _perhaps_set(state: ControlState, config: ControlConfig) -> Watchdog:
 
 
 def _after_watchdog(
-    state: ControlState, extra: Exchange, config: ControlConfig, events: list[Event], *, is_refused: bool
+    state: ControlState,
+    extra: Exchange,
+    now_tai_s: float,
+    config: ControlConfig,
+    events: list[Event],
+    *,
+    is_refused: bool,
 ) -> ControlState:
     """The watchdog counts as set when it was read back; a clean stop has written 0."""
     if extra.command == WriteParameter(WATCHDOG, 0):
         is_done = is_refused or isinstance(extra.reply, Ack)
         return changed(state, watchdog=Watchdog.UNKNOWN) if is_done else state
     if extra.reply == Parameter(WATCHDOG, watchdog_code(config)):
-        return changed(state, watchdog=Watchdog.SET, watchdog_try_count=0)
-    count = state.watchdog_try_count + 1
-    if is_refused or count >= WATCHDOG_TRIES:
+        return changed(state, watchdog=Watchdog.SET, watchdog_from_tai_s=None)
+    from_tai_s = now_tai_s if state.watchdog_from_tai_s is None else state.watchdog_from_tai_s
+    if is_refused or now_tai_s - from_tai_s >= WATCHDOG_TRY_S:
         advice = "if this host dies in a loss of signal, the antenna drives to its last command and stays there"
         events.append(Event("acu.watchdog_refused", {"advice": advice}, is_warning=True))
-        return changed(state, watchdog=Watchdog.REFUSED)
-    return changed(state, watchdog_try_count=count)
+        return changed(state, watchdog=Watchdog.REFUSED, watchdog_from_tai_s=None)
+    return changed(state, watchdog_from_tai_s=from_tai_s)
 
 
 def _matches(state: ControlState, read: Registers) -> bool:

@@ -140,7 +140,7 @@ class ControlState:
     held: Held | None = None  # None: it does not hold the antenna; kept through lost links and restarts
     is_stop_doubted: bool = False  # found in STANDBY, by a hand or by the register watchdog: FAULT DETAIL tells
     watchdog: Watchdog = Watchdog.UNKNOWN
-    watchdog_try_count: int = 0
+    watchdog_from_tai_s: float | None = None  # since when it is tried to set it
     axes: AxesWatch = AxesWatch()
     encoders: EncoderWatch = EncoderWatch()
 
@@ -170,6 +170,7 @@ class Observation:
     reading: Reading | None = None  # with the status it came from; None: no good reply to the last write or poll
     status: Status | None = None
     is_confirmed: bool = True  # the place in the status, by those before it
+    is_in_step: bool = True  # the reply is sure to be to this exchange: the reading's time is right
     extra: Exchange | None = None
     refused: Nak | None = None  # the ACU refused the register write
     silence_s: float = 0.0

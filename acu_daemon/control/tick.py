@@ -141,7 +141,7 @@ def _walk(
         state = changed(
             state, stage=Stage.NEW, last_extra=None, axis_az=None, axis_el=None, last_write_tai_s=None, commands=()
         )
-        state = changed(state, watchdog=watchdog, axes=AxesWatch(), is_place_sure=False)
+        state = changed(state, watchdog=watchdog, watchdog_from_tai_s=None, axes=AxesWatch(), is_place_sure=False)
     if track in HOLDING and before not in HOLDING:
         state = changed(state, hold_from_tai_s=now_tai_s)
     return state

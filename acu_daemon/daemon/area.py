@@ -3,7 +3,7 @@
 from collections import deque
 from dataclasses import dataclass, field
 
-from acu_daemon.assist.gate import DWELL
+from acu_daemon.assist.gate import DWELL, OUT_OF_STEP
 from acu_daemon.control.refit import GateVerdict
 from acu_daemon.control.state import ControlState, Sky
 from acu_daemon.model import Model, Reading, Readings
@@ -20,6 +20,7 @@ class CommonArea:
     refit_failed_count: int = 0
     gate: GateVerdict = GateVerdict()
     dwell_count: int = 0  # readings acquired, but not yet for the dwell time
+    out_of_step_count: int = 0  # locked readings that may answer an earlier command, one that had no answer in time
 
     @property
     def model(self) -> Model | None:
@@ -29,7 +30,8 @@ class CommonArea:
     @property
     def rejected_counts(self) -> dict[str, int]:
         """Readings that no fit has seen, by reason."""
-        return {**self.gate.counts, **({DWELL: self.dwell_count} if self.dwell_count else {})}
+        here = {DWELL: self.dwell_count, OUT_OF_STEP: self.out_of_step_count}
+        return {**self.gate.counts, **{reason: count for reason, count in here.items() if count}}
 
     def take_readings(self) -> Readings:
         """Hand over the locked readings that wait to be fitted, oldest first."""

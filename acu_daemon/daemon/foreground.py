@@ -18,7 +18,7 @@ from acu_daemon.daemon.clock_watch import ClockWatch
 from acu_daemon.daemon.lateness import Lateness
 from acu_daemon.daemon.line_watch import LineWatch
 from acu_daemon.daemon.port import AcuPort, Answer
-from acu_daemon.daemon.stopping import stop_antenna
+from acu_daemon.daemon.stopping import DEADLINE_S, stop_antenna
 from acu_daemon.edge.clock import Clock
 from acu_daemon.model import Reading
 from acu_daemon.protocol.messages import (
@@ -28,7 +28,6 @@ from acu_daemon.protocol.messages import (
     Identity,
     Nak,
     Poll,
-    Reply,
     SelectBackup,
     SelectMode,
     Status,
@@ -42,6 +41,7 @@ DOUBT_EVERY_S = 1.0
 LATE_SHARE = 0.5  # of the period: after a tick that began later than this the next one is skipped
 FIRST_SHARE = 0.2  # of the period, at least, before the first tick
 HURRY_SHARE = 0.9  # of the period: the next tick comes on time
+BLIND_S = 1.0  # without a status other replies keep the link no longer than this: they say nothing of the antenna
 
 
 class Foreground:
@@ -69,6 +69,7 @@ class Foreground:
         self._seen = Observation()
         self._requests: tuple[Request, ...] = ()
         self._connect_count = 0
+        self._status_s = -math.inf  # when the newest status came, believed or not, or was refused
         self._log: Any = structlog.get_logger("tick")
         self.identity: Identity | None = None
         self.tick_count = 0
@@ -148,7 +149,7 @@ class Foreground:
         self._seen = Observation()
         if not port.is_up:
             return
-        is_answered = await self._do(orders.first)
+        is_answered = await (self._question() if seen.must_poll else self._do(orders.first))
         is_progress = not seen.must_poll or area.state.stage is not Stage.READY  # no poll in the place of a write
         self.answered_count += is_answered and is_progress
         if orders.extra is not None and port.is_up and not port.must_poll:
@@ -160,10 +161,11 @@ class Foreground:
         self._requests = (*self._requests, request)
 
     def _silence_s(self) -> float:
-        """On another connection than before, however soon it came, everything is read again before it is commanded."""
+        """On another connection, however soon it came, everything is read again before it is commanded."""
         before, self._connect_count = self._connect_count, self._port.connect_count
         is_another = before != self._connect_count and self._area.state.stage is not Stage.NEW
-        return self._port.silence_s if self._port.is_up and not is_another else math.inf
+        is_blind = self._clock.monotonic_s() - self._status_s > BLIND_S
+        return self._port.silence_s if self._port.is_up and not is_another and not is_blind else math.inf
 
     async def _do(self, command: Command) -> bool:
         """One exchange; what it brings is gathered for the next decision.  A NAK is followed by a poll at once.
@@ -171,6 +173,8 @@ class Foreground:
         True: a reply came, be it a refusal.
         """
         answer = await self._port.exchange(command)
+        if isinstance(command, WriteAndPoll | Poll) and answer.reply is not None:
+            self._status_s = self._clock.monotonic_s()
         if isinstance(command, WriteAndPoll) and isinstance(answer.reply, Status):
             self.write_count += 1
         if isinstance(answer.reply, Status):
@@ -185,6 +189,15 @@ class Foreground:
             if isinstance(answer.reply, Nak):
                 await self._poll_after_nak(command)
         return answer.reply is not None
+
+    async def _question(self) -> bool:
+        """After a failed exchange: poll, or ask what stands in for it, whose answer nobody waits for."""
+        question = self._port.question()
+        if question is None:
+            return False
+        if isinstance(question, Poll):
+            return await self._do(question)
+        return (await self._port.exchange(question)).reply is not None
 
     async def _poll_after_nak(self, refused: Command) -> None:
         self._log.warning("acu.nak", command=command_text(refused))
@@ -205,11 +218,20 @@ class Foreground:
             self._report_doubt(status)
             return
         reading = Reading(sample_tai_s, status.az_deg, status.el_deg, is_acquired(status), status.agc_db)
-        self._seen = changed(self._seen, status=status, reading=reading, is_confirmed=self._doubt.is_confirmed)
-        is_fittable = self._area.state.track in AUTOTRACKING and not self._area.state.encoders.problem
-        if self._dwell.is_locked(reading) and is_fittable:
-            self._area.to_fit.append(reading)
+        self._seen = changed(
+            self._seen,
+            status=status,
+            reading=reading,
+            is_confirmed=self._doubt.is_confirmed,
+            is_in_step=answer.is_sure,
+        )
+        is_locked = self._dwell.is_locked(reading)
         self._area.dwell_count = self._dwell.rejected_count
+        if not answer.is_sure:
+            self._area.out_of_step_count += is_locked
+            return
+        if is_locked and self._area.state.track in AUTOTRACKING and not self._area.state.encoders.problem:
+            self._area.to_fit.append(reading)
         if self._on_reading is not None:
             self._on_reading(reading)
 
@@ -246,13 +268,4 @@ class Foreground:
     async def safe_stop(self) -> bool:
         """Stop the antenna.  True: stopped, or left to somebody else; False: not acknowledged."""
         clears_watchdog = self._config.register_watchdog_s > 0.0 and self._area.state.watchdog is not Watchdog.REFUSED
-        return await stop_antenna(self._port, await self._newest_status(), clears_watchdog=clears_watchdog)
-
-    async def _newest_status(self) -> Status:
-        """Ask for it where the run has ended before its first one; the caller has a deadline."""
-        status: Reply | None = self._area.state.status
-        while not isinstance(status, Status):
-            await self._port.wait_until_up()
-            status = (await self._port.exchange(Poll())).reply
-            await self._port.idle_gap()
-        return status
+        return await stop_antenna(self._port, DEADLINE_S, clears_watchdog=clears_watchdog)

@@ -20,6 +20,7 @@ class LineWatch:
         self._log: Any = structlog.get_logger("link")
         self._counts: deque[int] = deque(maxlen=WINDOW_LOOKS + 1)
         self._is_poor = False
+        self._late_count = 0  # while the line was good last
         self.alarm = ""
 
     def look(self) -> None:
@@ -30,14 +31,13 @@ class LineWatch:
             self._is_poor, self.alarm = False, ""
             return
         counts = (port.failed_exchange_count, port.garbled_count, port.discarded_count, self._doubt.count)
-        if self._counts and sum(counts) < self._counts[-1]:
-            self._counts.clear()  # another connection counts from zero
         self._counts.append(sum(counts))
         bad_count = self._counts[-1] - self._counts[0]
         if bad_count >= POOR_COUNT:
-            self.alarm = f"{bad_count} bad replies in {WINDOW_LOOKS} s: look at the line"
+            late = f", late ones {port.lateness}" if port.late_count > self._late_count else ""
+            self.alarm = f"{bad_count} bad replies in {WINDOW_LOOKS} s{late}: look at the line"
         elif bad_count == 0:
-            self.alarm = ""
+            self.alarm, self._late_count = "", port.late_count
         if bool(self.alarm) != self._is_poor:
             self._is_poor = bool(self.alarm)
             self._report(bad_count, *counts)
@@ -47,4 +47,4 @@ class LineWatch:
             self._log.info("link.good")
             return
         sums = {"failed": failed, "garbled": garbled, "late": late, "doubted": doubted}
-        self._log.warning("link.poor", bad=bad_count, in_s=WINDOW_LOOKS, **sums)
+        self._log.warning("link.poor", bad=bad_count, in_s=WINDOW_LOOKS, alarm=self.alarm, **sums)

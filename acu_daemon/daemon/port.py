@@ -2,34 +2,43 @@
 
 import asyncio
 import contextlib
+import math
 from array import array
 from dataclasses import dataclass
 from typing import Any
 
 import structlog
 
+from acu_daemon.control.causes import LINK_SILENCE_S
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.link import Link
 from acu_daemon.errors import LinkError
 from acu_daemon.protocol.exchange import HostExchange
-from acu_daemon.protocol.messages import Command, Poll, Reply, WriteAndPoll
+from acu_daemon.protocol.messages import Command, Identity, Poll, Reply, Status, WriteAndPoll
 from acu_daemon.protocol.sa3842 import exchange_bytes, reply_bytes
 
 EXCHANGE_DEADLINE_S = 0.090  # a reply is complete within this of the start of the write, ICD section 1
 CYCLE_SHARE = 0.95  # an exchange goes beside the write only if both fit into this share of the period, ICD section 6
 FIRST_BACK_OFF_S = 0.1
+FIRST_POLL_S = 0.5  # so long an open link is asked for its first answer, then closed, ICD section 1
 LAST_BACK_OFF_S = 1.0  # a pass is short: more than a second of waiting costs more than an attempt
+SHORTEST_WAIT_S = 0.001
 LATENCY_COUNT = 100
+LATE_STEP_MS = 50
 LONGEST_EXTRA = 18  # bytes of the longest housekeeping exchange that goes beside a write, ICD section 6
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What one exchange brought: the reply, or None at the deadline; when its write started, when the reply did."""
+    """What one exchange brought: the reply, or None at the deadline; when its write started, when the reply did.
+
+    is_sure: the reply is to this command, and to none before it that had no answer in time.
+    """
 
     reply: Reply | None
     started_tai_s: float
     first_byte_tai_s: float | None
+    is_sure: bool = True
 
 
 class AcuPort:
@@ -79,6 +88,17 @@ class AcuPort:
         return self._exchange.garbled_count
 
     @property
+    def late_count(self) -> int:
+        """Replies that came, but after their deadline."""
+        return self._exchange.late_count
+
+    @property
+    def lateness(self) -> str:
+        """How late the newest late reply was, for people, in steps so that they are not told of each one."""
+        late_ms = LATE_STEP_MS * math.ceil(1e3 * self._exchange.late_s / LATE_STEP_MS)
+        return f"up to {late_ms} ms after the command, {1e3 * EXCHANGE_DEADLINE_S:.0f} are allowed"
+
+    @property
     def has_room(self) -> bool:
         """Whether the computed cycle leaves room for a second exchange beside the write (ICD section 6)."""
         return self.both_s <= CYCLE_SHARE * self._period_s
@@ -94,8 +114,9 @@ class AcuPort:
         first_byte_s: float | None = None
         reply: Reply | None = None
         try:
-            self._link.drain_input()
-            frame = self._exchange.begin(command)
+            if unread := self._link.drain_input():
+                self._exchange.receive(unread, started_s)
+            frame = self._exchange.begin(command, started_s)
             wire_s = (len(frame) + reply_bytes(command)) * self._link.byte_time_s
             self._link.write(frame)
             until_s = asyncio.get_running_loop().time() + EXCHANGE_DEADLINE_S
@@ -103,19 +124,54 @@ class AcuPort:
                 while reply is None:
                     data, arrival_s = await self._link.read(until_s)
                     first_byte_s = arrival_s if first_byte_s is None else first_byte_s
-                    reply = self._exchange.receive(data)
+                    reply = self._exchange.receive(data, arrival_s)
         except LinkError as error:
             self.problem = str(error)
             self._drop(str(error))
         if reply is None:
-            self._exchange.fail()
+            self._exchange.fail(self._clock.monotonic_s())
             self.failed_exchange_count += 1
             return Answer(None, started_tai_s, None)
-        self.last_reply_s = self._clock.monotonic_s()
-        self._latencies_s[self._latency_count % LATENCY_COUNT] = max(0.0, self.last_reply_s - started_s - wire_s)
+        ended_s = self._clock.monotonic_s()
+        if not isinstance(reply, Identity) or reply.is_known:  # an identity is free text: another may be garble
+            self.last_reply_s = ended_s
+        self._latencies_s[self._latency_count % LATENCY_COUNT] = max(0.0, ended_s - started_s - wire_s)
         self._latency_count += 1
         first_byte_tai_s = None if first_byte_s is None else started_tai_s + first_byte_s - started_s
-        return Answer(reply, started_tai_s, first_byte_tai_s)
+        return Answer(reply, started_tai_s, first_byte_tai_s, self._exchange.is_sure)
+
+    def question(self) -> Command | None:
+        """A poll, or what may stand in its place after a failed exchange; None: nothing may yet (ICD section 1)."""
+        return self._exchange.question(self._clock.monotonic_s())
+
+    async def ask(self) -> Answer | None:
+        """Poll, or do what must come before that: another question, or a pause until one may be asked; then None."""
+        question = self.question()
+        if question is None:
+            await asyncio.sleep(self._exchange.free_s - self._clock.monotonic_s() + SHORTEST_WAIT_S)
+            return None
+        answer = await self.exchange(question)
+        await self.idle_gap()
+        return answer if isinstance(question, Poll) else None
+
+    async def status(self) -> Status:
+        """Ask until a status has come, over as many connections as it takes; whoever calls sets the deadline."""
+        while True:
+            await self.wait_until_up()
+            self.drop_if_silent(LINK_SILENCE_S)
+            answer = await self.ask() if self.is_up else None
+            if answer is not None and isinstance(answer.reply, Status):
+                return answer.reply
+
+    async def reply_to(self, command: Command) -> Reply:
+        """Send a command until it is answered, be it by a refusal; whoever calls sets the deadline."""
+        while True:
+            if self.must_poll or not self.is_up:
+                await self.status()
+            answer = await self.exchange(command)
+            await self.idle_gap()
+            if answer.reply is not None:
+                return answer.reply
 
     async def idle_gap(self) -> None:
         """Leave 10 idle bit times before the next command (ICD section 1)."""
@@ -125,7 +181,8 @@ class AcuPort:
     def drop_if_silent(self, limit_s: float) -> None:
         """Close and reopen a link without a valid reply for this long, so that no unsent write arrives as a burst."""
         if self.is_up and self.silence_s > limit_s:
-            self._drop(f"no valid reply for {self.silence_s:.1f} s")
+            late = f"; they come {self.lateness}" if self._exchange.late_at_s > self.last_reply_s else ""
+            self._drop(f"no valid reply for {self.silence_s:.1f} s{late}")
 
     def _drop(self, problem: str) -> None:
         if self.is_up:
@@ -140,25 +197,21 @@ class AcuPort:
         try:
             while True:
                 self.attempt_count += 1
+                opened_s = self._clock.monotonic_s()
                 try:
-                    await self._link.open()
-                    first = await self._first_poll()
+                    await self.open()
                 except LinkError as error:
                     if str(error) != reported:
                         reported = str(error)
                         self._log.warning("link.closed", link=self._link.description, reason=reported)
-                    self.problem = str(error)
                     self.attempt_count += 1
                     await self._link.close()
                     await asyncio.sleep(pause_s)
-                    pause_s = min(2 * pause_s, LAST_BACK_OFF_S)
+                    is_there = self._exchange.late_at_s > opened_s
+                    pause_s = FIRST_BACK_OFF_S if is_there else min(2 * pause_s, LAST_BACK_OFF_S)
                     continue
                 pause_s, reported = FIRST_BACK_OFF_S, ""
-                self.connect_count += 1
                 self._log.info("link.open", link=self._link.description)
-                self._reopen.clear()
-                self._first = first
-                self._up.set()
                 await self._reopen.wait()
                 self._log.warning("link.lost", link=self._link.description, reason=self.problem)
                 await self._link.close()
@@ -166,16 +219,30 @@ class AcuPort:
             self._up.clear()
             await self._link.close()
 
+    async def open(self) -> None:
+        """Open the link once.  It counts as up when the ACU has answered a poll on it.  LinkError: it has not."""
+        try:
+            await self._link.open()
+            self._first = await self._first_poll()
+        except LinkError as error:
+            self.problem = str(error)
+            raise
+        self.connect_count += 1
+        self._reopen.clear()
+        self._up.set()
+
     async def _first_poll(self) -> Answer:
-        """A link counts as up when the ACU has answered on it once."""
-        self._exchange, self.problem = HostExchange(self._address), ""
-        for _ in range(3):
-            answer = await self.exchange(Poll())
-            if answer.reply is not None:
+        self.problem, late_count = "", self._exchange.late_count
+        end_s = asyncio.get_running_loop().time() + FIRST_POLL_S
+        while asyncio.get_running_loop().time() < end_s:
+            answer = await self.ask()
+            if answer is not None and answer.reply is not None:
                 return answer
             if self.problem:
                 raise LinkError(self.problem)
-        raise LinkError(f"{self._link.description} is open, but no ACU answers a poll")
+        if self._exchange.late_count > late_count:
+            raise LinkError(f"{self._link.description} is open, but all replies come too late: {self.lateness}")
+        raise LinkError(f"{self._link.description} is open, but no ACU answers: check address and baud rate")
 
     def take_first(self) -> Answer | None:
         """Give the answer that showed the link to be up, once."""
@@ -185,4 +252,4 @@ class AcuPort:
     def abandon(self) -> None:
         """Give up an exchange whose waiter was cancelled, so that the next one starts clean."""
         if self._exchange.is_outstanding:
-            self._exchange.fail()
+            self._exchange.fail(self._clock.monotonic_s())

@@ -25,7 +25,6 @@ from acu_daemon.errors import NoAcuError, UsageError
 from acu_daemon.model import FitResult, Pass, Reading
 
 FIRST_POLL_S = 10.0  # no good poll within this of the start ends the run
-STOP_DEADLINE_S = 5.0  # a link that is down may come back; the service's TimeoutStopSec is longer
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +84,7 @@ class Service:
         files_alarm: Callable[[], str] = str,
         on_end: Callable[[], None] | None = None,
     ) -> None:
-        """on_end: called when the run is over, before the safe stop, which may take STOP_DEADLINE_S."""
+        """on_end: called when the run is over, before the safe stop, which may take stopping.DEADLINE_S."""
         self._job = job
         self._clock = clock
         self._runner = runner
@@ -199,13 +198,7 @@ class Service:
         self._port.abandon()
         if not self._foreground.owes_stop:
             return True
-        try:
-            async with asyncio.timeout(STOP_DEADLINE_S):
-                await self._port.wait_until_up()
-                return await self._foreground.safe_stop()
-        except TimeoutError:
-            self._log.error("stop.timeout", advice="the antenna may still follow its registers: look at the ACU")
-            return False
+        return await self._foreground.safe_stop()
 
     def _leave(self, *, is_stopped: bool) -> None:
         """Whoever starts next must not take our stop for another hand's."""

@@ -1,5 +1,6 @@
 """The safe stop: how the daemon leaves the antenna, at its own end and after a crash from which it does not return."""
 
+import asyncio
 from typing import Any
 
 import structlog
@@ -7,41 +8,45 @@ import structlog
 from acu_daemon.control.hands import NO_STOP_MODES
 from acu_daemon.control.start import WATCHDOG
 from acu_daemon.daemon.port import AcuPort
-from acu_daemon.protocol.messages import Ack, Command, Poll, Status, Stop, WriteParameter
+from acu_daemon.protocol.messages import Ack, Status, Stop, WriteParameter
 
-ATTEMPTS = 5
+DEADLINE_S = 5.0  # a link that is down may come back; the service's TimeoutStopSec is longer
+REPEAT_S = 0.1
 
 
-async def stop_antenna(port: AcuPort, status: Status, *, clears_watchdog: bool) -> bool:
+async def stop_antenna(port: AcuPort, deadline_s: float, *, clears_watchdog: bool) -> bool:
     """Send STOP until it is acknowledged, unless somebody else moves the antenna.  True: stopped, or left alone.
 
+    Before each STOP the ACU is polled: meanwhile, and while the link was down, a person may have stowed the antenna or
+    taken the local panel.  It is tried for deadline_s, over as many connections as it takes.
     clears_watchdog: then switch the ACU's register watchdog off, so that it does not hinder whoever comes next.
     """
     log: Any = structlog.get_logger("stop")
-    is_stopped = True
-    await port.idle_gap()
-    if status.mode in NO_STOP_MODES or not status.is_remote_enabled:
-        log.info("stop.left_alone", mode=status.mode.name)
-    elif await _acknowledged(port, Stop()):
-        log.info("stop.done")
-    else:
-        log.warning("stop.unconfirmed", advice="the antenna may still follow its registers: look at the ACU")
-        is_stopped = False
-    if clears_watchdog and is_stopped and status.is_remote_enabled:
-        await _acknowledged(port, WriteParameter(WATCHDOG, 0))
+    is_stopped = False
+    try:
+        async with asyncio.timeout(deadline_s):
+            status = await _stopped(port)
+            is_stopped = True
+            if clears_watchdog and status.is_remote_enabled:
+                await port.reply_to(WriteParameter(WATCHDOG, 0))
+    except TimeoutError:
+        if not is_stopped:
+            why = port.problem or "the ACU does not acknowledge it"
+            log.error("stop.timeout", reason=why, advice="the antenna may still follow its registers: look at the ACU")
     return is_stopped
 
 
-async def _acknowledged(port: AcuPort, command: Command) -> bool:
-    """Send a command until it is acknowledged, a few times."""
-    for _ in range(ATTEMPTS):
-        await port.wait_until_up()  # a link that fails meanwhile is reopened, and polled, by its keeper
-        if port.must_poll:
-            await port.exchange(Poll())
-            await port.idle_gap()
-            continue
-        answer = await port.exchange(command)
+async def _stopped(port: AcuPort) -> Status:
+    """Return the last status before the STOP that was acknowledged, or one that forbids it."""
+    log: Any = structlog.get_logger("stop")
+    while True:
+        status = await port.status()
+        if status.mode in NO_STOP_MODES or not status.is_remote_enabled:
+            log.info("stop.left_alone", mode=status.mode.name)
+            return status
+        answer = await port.exchange(Stop())
         await port.idle_gap()
         if isinstance(answer.reply, Ack):
-            return True
-    return False
+            log.info("stop.done")
+            return status
+        await asyncio.sleep(REPEAT_S)

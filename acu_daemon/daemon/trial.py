@@ -14,9 +14,6 @@ from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.fit import FitFailedError, FitRunner
 from acu_daemon.edge.link import Link
 from acu_daemon.errors import LinkError
-from acu_daemon.protocol.messages import Poll, Status
-
-FIRST_POLLS = 3
 
 
 @dataclass(slots=True)
@@ -28,6 +25,7 @@ class Trial:
     skipped_tick_count: int = 0
     round_trips_s: list[float] = field(default_factory=list)
     lost_poll_count: int = 0
+    late: str = ""  # how late the replies were that came after their deadline; "": none was
     link_problem: str = ""  # why no ACU was polled
     refits_s: list[float] = field(default_factory=list)
     fit_problem: str = ""
@@ -47,7 +45,7 @@ async def try_loop(
     has_begun = asyncio.Event()
     fit = asyncio.create_task(_fit(trial, clock, runner, requests, has_begun))
     try:
-        port = None if acu is None else await _open(trial, *acu)
+        port = None if acu is None else await _open(trial, acu[1])
         await has_begun.wait()
         gc.collect()
         gc.freeze()
@@ -61,17 +59,13 @@ async def try_loop(
     return trial
 
 
-async def _open(trial: Trial, link: Link, port: AcuPort) -> AcuPort | None:
+async def _open(trial: Trial, port: AcuPort) -> AcuPort | None:
     try:
-        await link.open()
+        await port.open()
     except LinkError as error:
         trial.link_problem = str(error)
         return None
-    for _ in range(FIRST_POLLS):
-        if isinstance((await port.exchange(Poll())).reply, Status):
-            return port
-    trial.link_problem = port.problem or f"{link.description} is open, but no ACU answers: check address and baud rate"
-    return None
+    return port
 
 
 async def _tick(trial: Trial, clock: Clock, port: AcuPort | None, duration_s: float, period_s: float) -> None:
@@ -89,10 +83,10 @@ async def _tick(trial: Trial, clock: Clock, port: AcuPort | None, duration_s: fl
 
 
 async def _poll(trial: Trial, clock: Clock, port: AcuPort) -> None:
-    begun_s = clock.monotonic_s()
-    answer = await port.exchange(Poll())
-    if answer.reply is None:
+    begun_s, question = clock.monotonic_s(), port.question()
+    if question is None or (await port.exchange(question)).reply is None:
         trial.lost_poll_count += 1
+        trial.late = port.lateness if port.late_count else ""
     else:
         trial.round_trips_s.append(clock.monotonic_s() - begun_s)
 

@@ -55,10 +55,14 @@ class Arrivals:
                     timer.cancel()
         return self._take()
 
-    def clear(self) -> None:
-        """Throw away what waits."""
+    def take_all(self) -> bytes:
+        """What waits, at once."""
+        if not self._chunks:
+            return b""
+        data = b"".join(chunk for chunk, _ in self._chunks)
         self._chunks.clear()
         self._waiting_count = 0
+        return data
 
     def _take(self) -> tuple[bytes, float]:
         data, arrival_s = self._chunks.popleft()

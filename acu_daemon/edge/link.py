@@ -43,8 +43,9 @@ class Link(Protocol):
         """
         ...
 
-    def drain_input(self) -> None:
-        """Throw away what has arrived and was not read."""
+    def drain_input(self) -> bytes:
+        """Take what has arrived and was not read.  LinkError: the link is not open."""
+        ...
 
     async def close(self) -> None:
         """Close at once; does nothing on a closed link."""

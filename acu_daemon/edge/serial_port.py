@@ -95,12 +95,13 @@ class SerialLink:
         self._opened()
         return await self._arrivals.get(until_s)
 
-    def drain_input(self) -> None:
-        """Throw away what has arrived and was not read."""
+    def drain_input(self) -> bytes:
+        """Take what has arrived and was not read; what the port still holds is thrown away.  LinkError: not open."""
         port = self._opened()
-        self._arrivals.clear()
+        data = self._arrivals.take_all()
         with contextlib.suppress(OSError, termios.error):
             port.reset_input_buffer()
+        return data
 
     async def close(self) -> None:
         """Close at once; what has not gone out never does."""

@@ -94,9 +94,9 @@ class TcpLink:
         """
         return await self._connected().arrivals.get(until_s)
 
-    def drain_input(self) -> None:
-        """Throw away what has arrived and was not read."""
-        self._connected().arrivals.clear()
+    def drain_input(self) -> bytes:
+        """Take what has arrived and was not read.  LinkError: not connected."""
+        return self._connected().arrivals.take_all()
 
     async def close(self) -> None:
         """Close at once; what an unanswered exchange still had to send never goes out."""

@@ -1,22 +1,44 @@
-"""One outstanding command at a time, without IO (ICD sections 1 and 2)."""
+"""One outstanding command at a time, without IO, and what may follow one that stayed unanswered (ICD sections 1 and 2).
 
-from acu_daemon.protocol.messages import Command, Garbled, Poll, Reply
+No reply says which of two equal commands it answers.  So a late one is kept from being taken for the next by CMD alone:
+after a failed exchange comes a command whose CMD nothing left unanswered in the last LATE_S has, and a reply with
+another CMD than the outstanding one is discarded.  An answer is `is_sure`, and the line in step, where the same holds
+of its own exchange: then no earlier command can have caused it, unless a reply was later than LATE_S.
+
+Times are readings of any clock that never goes back, seconds.
+"""
+
+from math import inf
+
+from acu_daemon.protocol.messages import Command, Garbled, Identify, Poll, ReadFaults, ReadRegisters, Reply
 from acu_daemon.protocol.sa3842 import CMD_OF, DEFAULT_ADDRESS, ReplyDecoder, encode_command
+
+LATE_S = 0.5  # so long after its exchange was given up a reply may still come
+QUESTIONS: tuple[Command, ...] = (Poll(), Identify(), ReadRegisters(), ReadFaults())  # in turn after a failed exchange
+_QUESTION_TYPES = tuple(type(question) for question in QUESTIONS)
+_NEVER = (0.0, -inf)
 
 
 class HostExchange:
     """The host's side of the dialogue: begin, then receive until a reply comes, or fail at the deadline.
 
-    discarded_count counts replies to another command, garbled_count frames that were no good reply.
+    discarded_count counts replies to another command, garbled_count frames that were no good reply, late_count replies
+    to an exchange that was given up; the newest of these came at late_at_s, late_s after the begin of its exchange.
     """
 
     def __init__(self, address: int = DEFAULT_ADDRESS) -> None:
         self._address = address
         self._decoder = ReplyDecoder(address)
         self._outstanding_cmd: int | None = None
+        self._begun_s = 0.0
+        self._unanswered: dict[int, tuple[float, float]] = {}  # by CMD, the newest: when it was begun, and given up
         self._must_poll = False
+        self.is_sure = True
         self.discarded_count = 0
         self.garbled_count = 0
+        self.late_count = 0
+        self.late_s = 0.0
+        self.late_at_s = -inf
 
     @property
     def is_outstanding(self) -> bool:
@@ -25,34 +47,62 @@ class HostExchange:
 
     @property
     def must_poll(self) -> bool:
-        """Whether the next command must be a Poll, because the last exchange failed."""
+        """Whether the next command must be a question, because the last exchange failed."""
         return self._must_poll
 
-    def begin(self, command: Command) -> bytes:
-        """Return the bytes to send.  RuntimeError: a command is outstanding, or a Poll is due first."""
+    def question(self, now_s: float) -> Command | None:
+        """A poll; after a failed exchange the first question whose CMD is free, None where none is before free_s."""
+        if not self._must_poll:
+            return QUESTIONS[0]
+        return next((question for question in QUESTIONS if not self._may_be_late(question, now_s)), None)
+
+    @property
+    def free_s(self) -> float:
+        """When the first question is free that is not."""
+        return min(self._unanswered.get(CMD_OF[kind], _NEVER)[1] for kind in _QUESTION_TYPES) + LATE_S
+
+    def _may_be_late(self, command: Command, now_s: float) -> bool:
+        """Whether a reply to an earlier command with this CMD may still come."""
+        return now_s - self._unanswered.get(CMD_OF[type(command)], _NEVER)[1] < LATE_S
+
+    def begin(self, command: Command, now_s: float) -> bytes:
+        """Return the bytes to send.  RuntimeError: a command is outstanding, or after a failed one no free question."""
         if self.is_outstanding:
             raise RuntimeError("a command is outstanding: receive its reply, or call fail() at its deadline")
-        if self._must_poll and not isinstance(command, Poll):
-            raise RuntimeError(f"after a failed exchange the next command is a Poll, not {type(command).__name__}")
+        self.is_sure = not self._may_be_late(command, now_s)
+        if self._must_poll and not (self.is_sure and isinstance(command, _QUESTION_TYPES)):
+            raise RuntimeError(f"the next command is a Poll or another free question, not {command}")
         self._decoder.reset()
-        self._outstanding_cmd = CMD_OF[type(command)]
+        self._outstanding_cmd, self._begun_s = CMD_OF[type(command)], now_s
         return encode_command(command, self._address)
 
-    def receive(self, data: bytes) -> Reply | None:
-        """Take the next bytes; return the reply to the outstanding command once it is complete."""
+    def receive(self, data: bytes, now_s: float) -> Reply | None:
+        """Take the next bytes; return the reply to the outstanding command once it is complete.
+
+        Also what arrives while none is outstanding, so that it is known to have come.
+        """
         answer: Reply | None = None
         for event in self._decoder.feed(data):
             if isinstance(event.reply, Garbled):
                 self.garbled_count += 1
-            elif event.cmd != self._outstanding_cmd:
-                self.discarded_count += 1
+            elif event.cmd is None or event.cmd != self._outstanding_cmd:
+                self._discard(event.cmd, now_s)
             else:
                 answer = event.reply
                 self._outstanding_cmd = None
                 self._must_poll = False
         return answer
 
-    def fail(self) -> None:
+    def _discard(self, cmd: int | None, now_s: float) -> None:
+        self.discarded_count += 1
+        begun_s, given_up_s = self._unanswered.get(-1 if cmd is None else cmd, _NEVER)
+        if now_s - given_up_s < LATE_S:
+            self.late_count += 1
+            self.late_s, self.late_at_s = now_s - begun_s, now_s
+
+    def fail(self, now_s: float) -> None:
         """Give the outstanding command up: its deadline has passed."""
+        if self._outstanding_cmd is not None:
+            self._unanswered[self._outstanding_cmd] = self._begun_s, now_s
         self._outstanding_cmd = None
         self._must_poll = True

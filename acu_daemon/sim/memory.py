@@ -102,10 +102,10 @@ class MemoryLink:
         self._opened()
         return await self._arrivals.get(until_s)
 
-    def drain_input(self) -> None:
-        """Throw away what has arrived and was not read."""
+    def drain_input(self) -> bytes:
+        """Take what has arrived and was not read."""
         self._opened()
-        self._arrivals.clear()
+        return self._arrivals.take_all()
 
     async def close(self) -> None:
         """Close."""
