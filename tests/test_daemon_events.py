@@ -469,6 +469,36 @@ def test_a_stop_while_the_link_is_lost_waits_a_moment_for_it() -> None:
     assert [command for _, command in flight.commands[-2:]] == [Stop(), WriteParameter("W", 0)]
 
 
+def test_a_safe_stop_polls_first_and_sends_nothing_to_an_antenna_that_was_stowed_while_the_link_was_cut() -> None:
+    script = [
+        (15.0, cut(True)),
+        (15.5, acu_does(lambda acu, _now: acu.answer(Stow()))),
+        (16.0, lambda stage: stage.service.stop("SIGTERM")),
+        (17.0, cut(False)),
+    ]
+    flight = climb(30.0, script=script)
+    assert flight.outcome is not None
+    assert flight.outcome.is_stopped
+    assert count(flight, Stop) == 0
+    assert [event["mode"] for event in events_named(flight, "stop.left_alone")] == ["STOWING"]
+    assert flight.rows[-1].mode is AcuMode.STOWING
+
+
+@pytest.mark.parametrize("verb", ["cut", "no-reply", "deaf"])
+@pytest.mark.parametrize("silent_s", [0.4, 1.5, 4.0])
+def test_a_safe_stop_is_tried_for_five_seconds_of_a_silent_line(verb: str, silent_s: float) -> None:
+    flight = climb(
+        30.0,
+        faults=[f"{verb} start_s=15.03 duration_s={silent_s}"],
+        script=[(15.05, lambda stage: stage.service.stop("SIGTERM"))],
+    )
+    assert flight.outcome is not None
+    assert flight.outcome.is_stopped
+    assert flight.commands[-2:][0][1] == Stop()
+    assert T + 15.03 + silent_s < flight.commands[-2][0] < T + 15.03 + silent_s + 1.0
+    assert not events_named(flight, "stop.timeout")
+
+
 def test_a_stop_on_a_dead_link_is_reported_and_does_not_hang() -> None:
     flight = climb(30.0, script=[(15.0, cut(True)), (16.0, lambda stage: stage.service.stop("SIGTERM"))])
     assert flight.outcome is not None

@@ -6,8 +6,8 @@ from collections.abc import Awaitable, Callable
 import pytest
 from fake_sky import AZIMUTH, ELEVATION, START_TAI_S, Star
 
-from acu_daemon.daemon.port import EXCHANGE_DEADLINE_S, AcuPort
-from acu_daemon.daemon.stopping import stop_antenna
+from acu_daemon.daemon.port import EXCHANGE_DEADLINE_S, FIRST_POLL_S, AcuPort
+from acu_daemon.daemon.stopping import DEADLINE_S, stop_antenna
 from acu_daemon.edge.clock import LoopClock
 from acu_daemon.errors import LinkError
 from acu_daemon.protocol.messages import Ack, AcuMode, Nak, Poll, SelectMode, Status, Stow, WriteAndPoll
@@ -244,10 +244,33 @@ def test_waiting_for_a_link_ends_when_it_is_up() -> None:
     play(story)
 
 
+def test_an_open_link_is_asked_for_more_than_half_a_second_before_it_is_closed() -> None:
+    """Three lost polls took a quarter of a second, and a second of pause after them."""
+
+    async def story(port: AcuPort, link: MemoryLink, clock: LoopClock) -> None:
+        link.is_cut = True
+        await port.exchange(Poll())
+        await asyncio.sleep(0.5)
+        port.drop_if_silent(0.5)
+        opened_s: list[float] = []
+        opens = link.open
+
+        async def noted() -> None:
+            opened_s.append(clock.monotonic_s())
+            await opens()
+
+        link.open = noted  # type: ignore[method-assign]
+        await asyncio.sleep(0.3)
+        link.is_cut = False
+        await port.wait_until_up()
+        assert len(opened_s) == 1
+        assert clock.monotonic_s() - opened_s[0] < FIRST_POLL_S + EXCHANGE_DEADLINE_S
+
+    play(story)
+
+
 def test_a_safe_stop_outlives_a_link_that_breaks_in_the_middle_of_it() -> None:
     async def story(port: AcuPort, link: MemoryLink, _clock: LoopClock) -> None:
-        standing = (await port.exchange(Poll())).reply
-        assert isinstance(standing, Status)
         write = link.write
 
         def broken(data: bytes) -> None:
@@ -256,7 +279,7 @@ def test_a_safe_stop_outlives_a_link_that_breaks_in_the_middle_of_it() -> None:
             write(data)
 
         link.write = broken  # type: ignore[method-assign]
-        assert await stop_antenna(port, standing, clears_watchdog=False)
+        assert await stop_antenna(port, DEADLINE_S, clears_watchdog=False)
         assert port.connect_count == 2
 
     play(story)

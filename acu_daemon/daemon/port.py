@@ -20,7 +20,7 @@ from acu_daemon.protocol.sa3842 import exchange_bytes, reply_bytes
 EXCHANGE_DEADLINE_S = 0.090  # a reply is complete within this of the start of the write, ICD section 1
 CYCLE_SHARE = 0.95  # an exchange goes beside the write only if both fit into this share of the period, ICD section 6
 FIRST_BACK_OFF_S = 0.1
-FIRST_POLL_S = 0.5  # so long an open link is asked for its first answer, then closed, ICD section 1
+FIRST_POLL_S = 0.6  # so long an open link is asked for its first answer: all four questions, and the poll once more
 LAST_BACK_OFF_S = 1.0  # a pass is short: more than a second of waiting costs more than an attempt
 SHORTEST_WAIT_S = 0.001
 LATENCY_COUNT = 100
@@ -57,6 +57,7 @@ class AcuPort:
         self._reopen = asyncio.Event()
         self._up = asyncio.Event()
         self._first: Answer | None = None
+        self._broken = ""  # why the present connection is
         self.problem = ""
         self.last_reply_s = clock.monotonic_s()
         self.connect_count = 0
@@ -126,7 +127,7 @@ class AcuPort:
                     first_byte_s = arrival_s if first_byte_s is None else first_byte_s
                     reply = self._exchange.receive(data, arrival_s)
         except LinkError as error:
-            self.problem = str(error)
+            self.problem = self._broken = str(error)
             self._drop(str(error))
         if reply is None:
             self._exchange.fail(self._clock.monotonic_s())
@@ -227,19 +228,20 @@ class AcuPort:
         except LinkError as error:
             self.problem = str(error)
             raise
+        self.problem = ""
         self.connect_count += 1
         self._reopen.clear()
         self._up.set()
 
     async def _first_poll(self) -> Answer:
-        self.problem, late_count = "", self._exchange.late_count
+        self._broken, late_count = "", self._exchange.late_count
         end_s = asyncio.get_running_loop().time() + FIRST_POLL_S
         while asyncio.get_running_loop().time() < end_s:
             answer = await self.ask()
             if answer is not None and answer.reply is not None:
                 return answer
-            if self.problem:
-                raise LinkError(self.problem)
+            if self._broken:
+                raise LinkError(self._broken)
         if self._exchange.late_count > late_count:
             raise LinkError(f"{self._link.description} is open, but all replies come too late: {self.lateness}")
         raise LinkError(f"{self._link.description} is open, but no ACU answers: check address and baud rate")

@@ -2,8 +2,12 @@
 
 No reply says which of two equal commands it answers.  So a late one is kept from being taken for the next by CMD alone:
 after a failed exchange comes a command whose CMD nothing left unanswered in the last LATE_S has, and a reply with
-another CMD than the outstanding one is discarded.  An answer is `is_sure`, and the line in step, where the same holds
-of its own exchange: then no earlier command can have caused it, unless a reply was later than LATE_S.
+another CMD than the outstanding one is discarded.
+
+An answer is `is_sure`, and the line in step, where no reply to an earlier command with its CMD can still have been on
+its way: each that was given up has come since, discarded, or LATE_S have passed.  What answers an unsure exchange may
+be an older reply, its own still to come.  On a line that keeps the order it is not: an answer to a later command has
+shown that the older reply is lost.  On one where a reply was overtaken it may be, and that exchange stays open.
 
 Times are readings of any clock that never goes back, seconds.
 """
@@ -14,9 +18,9 @@ from acu_daemon.protocol.messages import Command, Garbled, Identify, Poll, ReadF
 from acu_daemon.protocol.sa3842 import CMD_OF, DEFAULT_ADDRESS, ReplyDecoder, encode_command
 
 LATE_S = 0.5  # so long after its exchange was given up a reply may still come
+OVERTAKEN_S = 60.0  # so long a line that let a reply be overtaken is not trusted to keep the order
 QUESTIONS: tuple[Command, ...] = (Poll(), Identify(), ReadRegisters(), ReadFaults())  # in turn after a failed exchange
 _QUESTION_TYPES = tuple(type(question) for question in QUESTIONS)
-_NEVER = (0.0, -inf)
 
 
 class HostExchange:
@@ -31,7 +35,9 @@ class HostExchange:
         self._decoder = ReplyDecoder(address)
         self._outstanding_cmd: int | None = None
         self._begun_s = 0.0
-        self._unanswered: dict[int, tuple[float, float]] = {}  # by CMD, the newest: when it was begun, and given up
+        self._given_up_s: dict[int, float] = {}  # by CMD: when its newest exchange that failed was given up
+        self._open: dict[int, list[tuple[float, float]]] = {}  # by CMD: begin and end of exchanges without their reply
+        self._sure_s = self._overtaken_s = -inf  # the begin of the newest sure exchange; when a reply was overtaken
         self._must_poll = False
         self.is_sure = True
         self.discarded_count = 0
@@ -54,27 +60,33 @@ class HostExchange:
         """A poll; after a failed exchange the first question whose CMD is free, None where none is before free_s."""
         if not self._must_poll:
             return QUESTIONS[0]
-        return next((question for question in QUESTIONS if not self._may_be_late(question, now_s)), None)
+        return next((question for question in QUESTIONS if self._is_free(question, now_s)), None)
 
     @property
     def free_s(self) -> float:
         """When the first question is free that is not."""
-        return min(self._unanswered.get(CMD_OF[kind], _NEVER)[1] for kind in _QUESTION_TYPES) + LATE_S
+        return min(self._given_up_s.get(CMD_OF[kind], -inf) for kind in _QUESTION_TYPES) + LATE_S
 
-    def _may_be_late(self, command: Command, now_s: float) -> bool:
-        """Whether a reply to an earlier command with this CMD may still come."""
-        return now_s - self._unanswered.get(CMD_OF[type(command)], _NEVER)[1] < LATE_S
+    def _is_free(self, command: Command, now_s: float) -> bool:
+        return now_s - self._given_up_s.get(CMD_OF[type(command)], -inf) >= LATE_S
 
     def begin(self, command: Command, now_s: float) -> bytes:
         """Return the bytes to send.  RuntimeError: a command is outstanding, or after a failed one no free question."""
         if self.is_outstanding:
             raise RuntimeError("a command is outstanding: receive its reply, or call fail() at its deadline")
-        self.is_sure = not self._may_be_late(command, now_s)
-        if self._must_poll and not (self.is_sure and isinstance(command, _QUESTION_TYPES)):
+        if self._must_poll and not (isinstance(command, _QUESTION_TYPES) and self._is_free(command, now_s)):
             raise RuntimeError(f"the next command is a Poll or another free question, not {command}")
         self._decoder.reset()
         self._outstanding_cmd, self._begun_s = CMD_OF[type(command)], now_s
+        self.is_sure = not self._still_open(self._outstanding_cmd, now_s)
         return encode_command(command, self._address)
+
+    def _still_open(self, cmd: int, now_s: float) -> list[tuple[float, float]]:
+        """Exchanges with this CMD whose replies may still come, oldest first."""
+        left = self._open.get(cmd)
+        if left:
+            left[:] = [one for one in left if now_s - one[1] < LATE_S]
+        return left or []
 
     def receive(self, data: bytes, now_s: float) -> Reply | None:
         """Take the next bytes; return the reply to the outstanding command once it is complete.
@@ -86,23 +98,35 @@ class HostExchange:
             if isinstance(event.reply, Garbled):
                 self.garbled_count += 1
             elif event.cmd is None or event.cmd != self._outstanding_cmd:
-                self._discard(event.cmd, now_s)
+                self._discard(event.cmd or 0, now_s)
             else:
                 answer = event.reply
-                self._outstanding_cmd = None
-                self._must_poll = False
+                self._answered(event.cmd, now_s)
         return answer
 
-    def _discard(self, cmd: int | None, now_s: float) -> None:
+    def _answered(self, cmd: int, now_s: float) -> None:
+        self._outstanding_cmd = None
+        self._must_poll = False
+        if self.is_sure:
+            self._sure_s = self._begun_s
+        elif now_s - self._overtaken_s < OVERTAKEN_S and (left := self._still_open(cmd, now_s)):
+            left.append((self._begun_s, now_s))
+            left.pop(0)  # one reply of them all has come
+
+    def _discard(self, cmd: int, now_s: float) -> None:
         self.discarded_count += 1
-        begun_s, given_up_s = self._unanswered.get(-1 if cmd is None else cmd, _NEVER)
-        if now_s - given_up_s < LATE_S:
+        if left := self._still_open(cmd, now_s):
+            begun_s, _ = left.pop(0)
             self.late_count += 1
             self.late_s, self.late_at_s = now_s - begun_s, now_s
+            if begun_s < self._sure_s:
+                self._overtaken_s = now_s
 
     def fail(self, now_s: float) -> None:
         """Give the outstanding command up: its deadline has passed."""
-        if self._outstanding_cmd is not None:
-            self._unanswered[self._outstanding_cmd] = self._begun_s, now_s
+        cmd = self._outstanding_cmd
+        if cmd is not None:
+            self._given_up_s[cmd] = now_s
+            self._open.setdefault(cmd, []).append((self._begun_s, now_s))
         self._outstanding_cmd = None
         self._must_poll = True
