@@ -11,7 +11,7 @@ import structlog
 
 from acu_daemon.control.causes import LINK_SILENCE_S
 from acu_daemon.edge.clock import Clock
-from acu_daemon.edge.link import Link
+from acu_daemon.edge.link import Link, open_once
 from acu_daemon.errors import LinkError
 from acu_daemon.protocol.exchange import HostExchange
 from acu_daemon.protocol.messages import Command, Identity, Poll, Reply, Status, WriteAndPoll
@@ -220,10 +220,13 @@ class AcuPort:
             self._up.clear()
             await self._link.close()
 
-    async def open(self) -> None:
-        """Open the link once.  It counts as up when the ACU has answered a poll on it.  LinkError: it has not."""
+    async def open(self, *, tries_all: bool = False) -> None:
+        """Open the link once.  It counts as up when the ACU has answered a poll on it.  LinkError: it has not.
+
+        tries_all: at every address of its name, where nobody will try again.
+        """
         try:
-            await self._link.open()
+            await (open_once(self._link) if tries_all else self._link.open())
             self._first = await self._first_poll()
         except LinkError as error:
             self.problem = str(error)

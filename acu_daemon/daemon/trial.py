@@ -61,7 +61,7 @@ async def try_loop(
 
 async def _open(trial: Trial, port: AcuPort) -> AcuPort | None:
     try:
-        await port.open()
+        await port.open(tries_all=True)
     except LinkError as error:
         trial.link_problem = str(error)
         return None
