@@ -11,6 +11,7 @@ import typer
 from acu_daemon import PROCESS_START_S
 from acu_daemon.config import load_satellite, load_station
 from acu_daemon.config_tables import SatelliteFile, StationFile
+from acu_daemon.control.approach import longest_lead_s
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.elements_file import LoadedElements, load_elements
 from acu_daemon.edge.state import refuse_world_writable
@@ -139,12 +140,18 @@ def ending(target: Target, end_tai_s: float) -> str:
 def not_covered(target: Target, coming: Pass, now_tai_s: float) -> str:
     """Say what an ephemeris lacks for a pass; empty for other elements and where it lacks nothing."""
     tracking = target.station.tracking
-    from_tai_s = max(coming.rise_tai_s - tracking.preposition_s, now_tai_s)
+    from_tai_s = max(coming.rise_tai_s - longest_lead(target), now_tai_s)
     from_tai_s -= longest_window_s(target.station.acu.azimuth.limits()) + SPARE_S
     to_tai_s = coming.set_tai_s + tracking.horizon_s + SPARE_S
     return lacking(
         target, f"the pass of {target.elements.label} at {utc_text(coming.rise_tai_s, 0)}", from_tai_s, to_tai_s
     )
+
+
+def longest_lead(target: Target) -> float:
+    """How long before a rise the antenna sets out at most, s: from the far end of its drives."""
+    acu = target.station.acu
+    return longest_lead_s(acu.azimuth.limits(), acu.elevation.limits(), target.station.tracking.preposition_s)
 
 
 def lacking(target: Target, what: str, from_tai_s: float, to_tai_s: float) -> str:

@@ -2,13 +2,13 @@
 
 from math import cos, hypot, radians
 
+from acu_daemon.control.approach import ACQUIRE_LEAD_S, lead_s
 from acu_daemon.control.state import ControlConfig, ControlState, PassPlan, Sky, Stage
 from acu_daemon.control.states import HOLDING, Cause, TrackState
 from acu_daemon.model import Pointing, sky_angle_deg
 from acu_daemon.protocol.messages import AcuMode, Status
 
 LINK_SILENCE_S = 0.5  # ICD section 1
-ACQUIRE_LEAD_S = 20.0  # autotrack may be selected this long before the rise
 ON_POINT_BEAMS = 0.25
 RESUME_DEG = 5.0  # an antenna this near to the path goes on from an interruption without a new approach
 BEFORE = frozenset({TrackState.IDLE, TrackState.PREPOSITION})  # only there it matters where the antenna stands
@@ -99,7 +99,7 @@ def _of_plan(state: ControlState, status: Status, sky: Sky, now_tai_s: float, co
     if now_tai_s > pass_end_tai_s(plan, sky):
         return {Cause.PASS_OVER}
     causes: set[Cause] = set()
-    if sky.prediction is not None and now_tai_s >= plan.rise_tai_s - config.preposition_s:
+    if sky.prediction is not None and now_tai_s >= plan.rise_tai_s - lead_s(plan, state, config):
         causes.add(Cause.PASS_NEAR)
     if state.track in BEFORE and now_tai_s >= plan.rise_tai_s - ACQUIRE_LEAD_S:
         target = path_point(sky, now_tai_s)

@@ -94,7 +94,12 @@ TABLE: tuple[Row, ...] = (
     Row(frozenset({S.IDLE, S.PREPOSITION}), Cause.ACQUIRED, S.AUTOTRACK_TLE),
     Row(frozenset({S.IDLE}), Cause.STILL_FITTED, S.HOLD_FITTED),
     Row(frozenset({S.IDLE}), Cause.STILL_SELECTED, S.ACQUIRE_TLE),
-    Row(frozenset({S.IDLE}), Cause.PASS_NEAR, S.PREPOSITION, "preposition_s before the rise"),
+    Row(
+        frozenset({S.IDLE}),
+        Cause.PASS_NEAR,
+        S.PREPOSITION,
+        "before the rise: preposition_s, or as the way takes",
+    ),
     Row(frozenset({S.PREPOSITION}), Cause.ON_POINT_FITTED, S.HOLD_FITTED),
     Row(frozenset({S.PREPOSITION}), Cause.ON_POINT, S.ACQUIRE_TLE, "20 s before the rise or later"),
     Row(TRACKING, Cause.MODE_LEFT, S.IDLE),

@@ -7,6 +7,7 @@ they take effect, and passes it through the safety gate.  control.state is its m
 import math
 
 from acu_daemon.control.absorb import absorb
+from acu_daemon.control.approach import way_to
 from acu_daemon.control.axis_watch import AxesWatch
 from acu_daemon.control.causes import LINK_SILENCE_S, find_causes, path_point
 from acu_daemon.control.changed import changed
@@ -135,6 +136,8 @@ def _walk(
             is_warning=track in (TrackState.LINK_LOST, TrackState.FAULT, TrackState.SEARCH),
         )
     )
+    if track is TrackState.PREPOSITION:
+        events += _lateness(state, sky, now_tai_s, config)
     state = changed(state, track=track, entered_tai_s=now_tai_s)
     if track is TrackState.LINK_LOST:
         watchdog = Watchdog.UNKNOWN if state.watchdog is Watchdog.SET else state.watchdog
@@ -145,6 +148,19 @@ def _walk(
     if track in HOLDING and before not in HOLDING:
         state = changed(state, hold_from_tai_s=now_tai_s)
     return state
+
+
+def _lateness(state: ControlState, sky: Sky, now_tai_s: float, config: ControlConfig) -> list[Event]:
+    """Say that the antenna sets out too late to be there at the rise."""
+    if sky.plan is None:
+        return []
+    way = way_to(sky.plan, state, config)
+    late_s = now_tai_s + way.both_s - sky.plan.rise_tai_s
+    if late_s <= 0.0:
+        return []
+    seconds = {"late_s": late_s, "azimuth_s": way.azimuth_s, "elevation_s": way.elevation_s}
+    fields = {name: round(value, 1) for name, value in seconds.items()}
+    return [Event("pass.late", fields, is_warning=True)]
 
 
 def _is_sure(sky: Sky, now_tai_s: float, config: ControlConfig) -> bool:

@@ -9,9 +9,10 @@ from typing import Any
 import structlog
 
 from acu_daemon.assist.gate import ABOVE_MAX_ELEVATION
+from acu_daemon.control.approach import lead_s
 from acu_daemon.control.refit import GateVerdict, RefitReply, RefitRequest, RefitSetup, before_fit, predict_from
 from acu_daemon.control.state import ControlConfig, PassPlan
-from acu_daemon.control.states import AUTOTRACKING, HOLDING, TrackState
+from acu_daemon.control.states import ACTIVE, AUTOTRACKING, HOLDING, TrackState
 from acu_daemon.control.track_frame import extents
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.edge.clock import Clock
@@ -116,7 +117,9 @@ class Background:
 
     def _is_near(self, now_tai_s: float) -> bool:
         plan = self._area.sky.plan
-        return plan is not None and now_tai_s >= plan.rise_tai_s - self._control.preposition_s - REFIT_PERIOD_S
+        if plan is None or self._area.state.track in ACTIVE:
+            return plan is not None
+        return now_tai_s >= plan.rise_tai_s - lead_s(plan, self._area.state, self._control) - REFIT_PERIOD_S
 
     async def _refit(self) -> None:
         area = self._area

@@ -8,6 +8,7 @@ from typing import Any
 
 import structlog
 
+from acu_daemon.control.approach import lead_s
 from acu_daemon.control.causes import pass_end_tai_s
 from acu_daemon.control.plan import plan_pass
 from acu_daemon.control.refit import RefitSetup
@@ -189,6 +190,7 @@ class Service:
             duration_s=round(job.coming.duration_s, 1),
             culmination_deg=round(job.coming.culmination_el_deg, 2),
             start_az_deg=round(plan.start_az_deg, 2),
+            lead_s=round(lead_s(plan, state, job.control), 1),
         )
         if plan.note:
             self._log.warning("pass.wrap", note=plan.note)

@@ -1,0 +1,87 @@
+"""The antenna is at the rise point before the rise, however slow its drives; where it cannot be, it says how late."""
+
+import pytest
+from flights import DEMO_TAI_S, demo_target, events_named, flight_of, the_pass
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acu_daemon.cli.options import Target, not_covered
+from acu_daemon.cli.virtual_pass import Flight
+from acu_daemon.control.approach import longest_lead_s, way_s
+from acu_daemon.control.gate import CHASE_ACCELERATION_MARGIN, CHASE_RATE_MARGIN
+from acu_daemon.model import AxisLimits
+from acu_daemon.pointing.axis import AxisState, step
+from acu_daemon.sim.scenario import AcuChoice
+from acu_daemon.units import wrap_180
+
+SLOW = {"max_rate_deg_s": 1.5, "max_acceleration_deg_s2": 1.0}
+ON_POINT_DEG = 0.25
+SAID_S = 3.0  # what is said and what is flown may differ by so much
+
+
+def slow_target(**tracking: float) -> Target:
+    return demo_target(azimuth=SLOW, tracking=tracking)
+
+
+def far_from_rise(before_rise_s: float, target: Target, turn_deg: float) -> Flight:
+    """Started so long before the rise, the antenna so far from its point."""
+    coming = the_pass(target, DEMO_TAI_S)
+    start_deg = wrap_180(coming.rise_az_deg)
+    antenna = AcuChoice(azimuth_deg=start_deg + turn_deg, elevation_deg=80.0)
+    begin_tai_s = coming.rise_tai_s - before_rise_s
+    return flight_of(target, begin_tai_s, before_rise_s + 60.0, antenna=antenna)
+
+
+def off_the_rise_point_s(flight: Flight, target: Target) -> float:
+    """From the rise on until the antenna is on the path."""
+    rise_tai_s = the_pass(target, DEMO_TAI_S).rise_tai_s
+    off = [row.tai_s for row in flight.rows if row.beam_error_deg is None or row.beam_error_deg > ON_POINT_DEG]
+    return max(off) - rise_tai_s
+
+
+@pytest.mark.parametrize("turn_deg", [-170.0, -155.0])
+def test_an_azimuth_of_one_and_a_half_degrees_a_second_is_at_the_rise_point_before_the_rise(turn_deg: float) -> None:
+    """It needs 127 s for the way, more than a preposition_s of 60 s."""
+    target = slow_target(preposition_s=60.0)
+    flight = far_from_rise(220.0, target, turn_deg)
+    rise_tai_s = the_pass(target, DEMO_TAI_S).rise_tai_s
+    acquiring = [event for event in events_named(flight, "state.changed") if event["state"] == "ACQUIRE/TLE"]
+    assert acquiring
+    assert events_named(flight, "pass.late") == []
+    assert off_the_rise_point_s(flight, target) < 2.0
+    assert min(seen.tai_s for seen in flight.snapshots if seen.state == "ACQUIRE/TLE") < rise_tai_s - 15.0
+    assert min(seen.tai_s for seen in flight.snapshots if seen.state == "PREPOSITION") < rise_tai_s - 138.0
+
+
+def test_started_too_late_it_says_how_many_seconds_and_is() -> None:
+    target = slow_target()
+    flight = far_from_rise(60.0, target, -170.0)
+    (said,) = events_named(flight, "pass.late")
+    assert said["late_s"] == pytest.approx(71.0, abs=1.0)
+    assert said["azimuth_s"] > said["elevation_s"]
+    standing = min(seen.tai_s for seen in flight.snapshots if seen.state == "PREPOSITION")
+    assert standing - the_pass(target, DEMO_TAI_S).rise_tai_s < -58.0
+
+
+def test_preposition_s_is_a_floor_for_quick_drives() -> None:
+    target = demo_target()
+    flight = far_from_rise(150.0, target, 100.0)
+    set_out = min(seen.tai_s for seen in flight.snapshots if seen.state == "PREPOSITION")
+    assert set_out - the_pass(target, DEMO_TAI_S).rise_tai_s == pytest.approx(-120.0, abs=1.2)
+
+
+@given(st.floats(0.1, 540.0), st.floats(0.2, 30.0), st.floats(0.1, 30.0))
+def test_the_way_takes_as_long_as_an_axis_that_is_driven_takes(distance: float, rate: float, pull: float) -> None:
+    limits = AxisLimits(-270.0, 270.0, rate, pull)
+    driven = AxisLimits(-270.0, 270.0, CHASE_RATE_MARGIN * rate, CHASE_ACCELERATION_MARGIN * pull)
+    dt_s = way_s(distance, limits) / 400.0
+    state, steps = AxisState(0.0), 0
+    while abs(state.position_deg - distance) > 0.01 * distance and steps < 1000:
+        state, steps = step(state, distance, 0.0, dt_s, driven), steps + 1
+    assert steps * dt_s == pytest.approx(way_s(distance, limits), rel=0.15)
+
+
+def test_an_ephemeris_must_cover_the_approach_from_the_far_end() -> None:
+    azimuth, elevation = AxisLimits(-270.0, 270.0, 1.5, 1.0), AxisLimits(0.0, 90.0, 5.0, 5.0)
+    assert longest_lead_s(azimuth, elevation, 120.0) == pytest.approx(540.0 / 1.35 + 1.35 / 0.6 + 23.0)
+    assert not_covered(slow_target(), the_pass(slow_target(), DEMO_TAI_S), DEMO_TAI_S) == ""
