@@ -5,7 +5,7 @@ Only what is held while the table says that it is this pass's satellite counts; 
 
 from acu_daemon.control.causes import is_acquired
 from acu_daemon.control.changed import changed
-from acu_daemon.control.state import ControlConfig, ControlState, Event, Observation, PathOffset, Sky
+from acu_daemon.control.state import ControlConfig, ControlState, Event, Observation, PathOffset, Scan, Sky
 from acu_daemon.control.states import AUTOTRACKING, TrackState
 from acu_daemon.control.track_frame import extents, offset_of
 from acu_daemon.model import Reading
@@ -18,7 +18,9 @@ def forget_other_pass(state: ControlState, sky: Sky) -> ControlState:
     if sky.plan is None or sky.plan.rise_tai_s == state.pass_rise_tai_s:
         return state
     if state.pass_rise_tai_s is not None:
-        state = changed(state, offset=None, acquired_since_tai_s=None, has_locked=False, has_acquired=False)
+        state = changed(
+            state, scan=Scan(), offset=None, acquired_since_tai_s=None, has_locked=False, has_acquired=False
+        )
     return changed(state, pass_rise_tai_s=sky.plan.rise_tai_s)
 
 

@@ -93,6 +93,23 @@ class PathOffset:
     model: Model
 
 
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """How far SEARCH has come (control.search): what each row covers, early to late, s; where it looks now."""
+
+    model: Model | None = None
+    rows: tuple[tuple[int, tuple[float, float]], ...] = ()
+    row: int = 0
+    side: int = 0  # -1 early, 1 late, 0: none can be looked at now
+    along_s: float = 0.0
+    is_aimed: bool = False
+    round_count: int = 0  # how often all was covered
+
+    @property
+    def covered(self) -> dict[int, tuple[float, float]]:
+        return dict(self.rows)
+
+
 @dataclass(frozen=True)
 class ControlState:
     """The memory of the 10 Hz decision.  Without slots, which `changed` (control.changed) cannot copy at once."""
@@ -116,6 +133,8 @@ class ControlState:
     hold_from_tai_s: float = -inf
     offset: PathOffset | None = None  # carries the path before the first fit
     is_offset_refused: bool = False
+    scan: Scan = Scan()
+    scanned_tai_s: float = -inf  # the newest reading that the scan has taken
     pass_rise_tai_s: float | None = None  # of the pass for which it, and that a signal was acquired, is known
     axis_az: AxisState | None = None  # the last command as position and rate, continuous azimuth
     axis_el: AxisState | None = None

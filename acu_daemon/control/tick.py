@@ -26,7 +26,8 @@ from acu_daemon.control.hands import (
 )
 from acu_daemon.control.modes import wanted_mode_command
 from acu_daemon.control.path_offset import forget_other_pass, learn_of_signal
-from acu_daemon.control.search import search_offset, search_pointing
+from acu_daemon.control.search import pointing
+from acu_daemon.control.searching import search
 from acu_daemon.control.start import next_command
 from acu_daemon.control.state import (
     ControlConfig,
@@ -66,6 +67,7 @@ def tick(
     state = let_be(watch_antenna(state, seen, config, events))
     state = note_held(_walk(forget_other_pass(state, sky), seen, sky, now_tai_s, config, events), config)
     state = learn_of_signal(state, seen, sky, config, events)
+    state = search(before, state, sky, now_tai_s, config, events)
     is_write_owed = bool(before.commands) and before.commands[-1] is None
     state, orders = _order(state, seen, sky, now_tai_s, config, events, is_write_owed=is_write_owed)
     return fence(state, orders, config)
@@ -259,10 +261,7 @@ def _point(
     if state.track not in ACTIVE or (not is_followed and state.track not in AUTOTRACKING):
         return None  # a mode that follows the registers must find them where the antenna is, not where it shall go
     if state.track is TrackState.SEARCH and sky.prediction is not None:
-        offset = search_offset(
-            aim_tai_s - state.entered_tai_s, config.search_s, config.search_along_s, config.search_across_deg
-        )
-        return search_pointing(sky.prediction, aim_tai_s, offset, config.elevation, config.min_elevation_deg)
+        return pointing(state.scan, sky.prediction, aim_tai_s, config) or path_point(sky, aim_tai_s)
     return _learned_point(state, sky, aim_tai_s, is_followed=is_followed) or path_point(
         sky, aim_tai_s, follow=is_followed
     )

@@ -4,6 +4,7 @@ import shutil
 import sys
 from typing import Protocol
 
+from acu_daemon.control.states import TrackState
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.model import Model
 from acu_daemon.orbit.timescales import utc_text
@@ -35,6 +36,7 @@ def live_text(seen: Snapshot, beam_error_deg: float | None = None) -> str:
         hands,
         f"latched: {seen.latch}" if seen.latch else "",
         f"{seen.state:16} {antenna}",
+        f"searched {seen.search}" if seen.state == TrackState.SEARCH else "",
         miss,
         correction,
         _inside(seen),

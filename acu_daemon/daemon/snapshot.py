@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from acu_daemon.control.search import covered_text
 from acu_daemon.control.state import ControlConfig, ControlState
 from acu_daemon.control.states import AUTOTRACKING, TrackState
 from acu_daemon.daemon.area import CommonArea
@@ -57,6 +58,7 @@ class Snapshot:
     line_alarm: str = ""
     files_alarm: str = ""  # what cannot be written: recording, state
     clamped_count: int = 0  # followed writes that the gate held back to what the axes can do
+    search: str = ""  # what SEARCH has covered so far
     rejecting: str = ""  # why the newest readings are not fitted
     rejected_counts: dict[str, int] = field(default_factory=dict)  # readings so far, by reason
 
@@ -85,6 +87,7 @@ def take_snapshot(
         command_az_deg=state.axis_az.position_deg if state.axis_az else None,
         command_el_deg=state.axis_el.position_deg if state.axis_el else None,
         agc_db=status.agc_db if status else None,
+        search=covered_text(state.scan, prediction, control) if state.scan.rows else "",
         is_acquired=state.track is not TrackState.LINK_LOST and reading is not None and reading.is_locked,
         miss_deg=None if state.track is TrackState.LINK_LOST else _miss_deg(reading, prediction),
         along_s=sky.fit.along_s if sky.fit else None,
