@@ -1,10 +1,11 @@
 """Which causes of a transition are present now (control.states has the table they drive)."""
 
-from math import cos, hypot, radians
+from math import hypot
 
 from acu_daemon.control.approach import ACQUIRE_LEAD_S, lead_s
 from acu_daemon.control.state import ControlConfig, ControlState, PassPlan, Sky, Stage
 from acu_daemon.control.states import HOLDING, Cause, TrackState
+from acu_daemon.control.track_frame import extents, is_within, offset_of
 from acu_daemon.model import Pointing, sky_angle_deg
 from acu_daemon.protocol.messages import AcuMode, Status
 
@@ -87,9 +88,9 @@ def _is_ours(state: ControlState, status: Status, sky: Sky, now_tai_s: float, co
     target = path_point(sky, now_tai_s)
     if target is None:
         return True
-    east_deg_s = target.az_rate_deg_s * cos(radians(target.el_deg))
-    searched_deg = config.search_along_s * hypot(east_deg_s, target.el_rate_deg_s) + config.search_across_deg
-    return _distance_deg(state, status, target) < max(RESUME_DEG, searched_deg)
+    if sky.prediction is None or _distance_deg(state, status, target) < RESUME_DEG:
+        return True
+    return is_within(offset_of(sky.prediction, now_tai_s, state.az_deg, status.el_deg), extents(sky.prediction, config))
 
 
 def _of_plan(state: ControlState, status: Status, sky: Sky, now_tai_s: float, config: ControlConfig) -> set[Cause]:

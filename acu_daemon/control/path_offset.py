@@ -7,7 +7,7 @@ from acu_daemon.control.causes import is_acquired
 from acu_daemon.control.changed import changed
 from acu_daemon.control.state import ControlConfig, ControlState, Event, Observation, PathOffset, Scan, Sky
 from acu_daemon.control.states import AUTOTRACKING, TrackState
-from acu_daemon.control.track_frame import extents, offset_of
+from acu_daemon.control.track_frame import extents, is_within, offset_of
 from acu_daemon.model import Reading
 
 GAIN = 0.6  # of the newest reading in the smoothed offset: autotrack pulls in quickly
@@ -51,7 +51,7 @@ def _learn_offset(
     if prediction is None or new is None:
         return state
     most_along_s, most_across_deg = extents(prediction, config)
-    if abs(new[0]) > most_along_s or abs(new[1]) > most_across_deg:
+    if not is_within(new, (most_along_s, most_across_deg)):
         if not state.is_offset_refused:
             fields = {
                 "along_s": round(new[0], 1),

@@ -59,8 +59,8 @@ def boxes(prediction: Prediction | None, config: ControlConfig) -> tuple[Box, ..
 
 
 def _row_count(across_deg: float, config: ControlConfig) -> int:
-    """So many rows that the outermost sees what is across_deg off."""
-    return max(0, ceil((across_deg - config.beamwidth_deg / 2) / row_deg(config) - 1e-9))
+    """So many rows that the outermost, with its half of the distance between rows, reaches what is across_deg off."""
+    return max(0, ceil((across_deg - row_deg(config) / 2) / row_deg(config) - 1e-9))
 
 
 def place(scan: Scan, config: ControlConfig) -> tuple[float, float]:

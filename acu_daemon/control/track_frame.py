@@ -27,6 +27,11 @@ def extents(prediction: Prediction | None, config: ControlConfig) -> tuple[float
     return along_s, across_deg
 
 
+def is_within(offset: tuple[float, float] | None, most: tuple[float, float]) -> bool:
+    """Whether an offset is no more than extents allow."""
+    return offset is not None and abs(offset[0]) <= most[0] and abs(offset[1]) <= most[1]
+
+
 def beside(
     prediction: Prediction, tai_s: float, offset: tuple[float, float], *, pace: float = 0.0, follow: bool = False
 ) -> Pointing | None:
