@@ -1,6 +1,7 @@
 """Two-line element sets: what is read, and what is refused with file, line and reason."""
 
 import gzip
+from dataclasses import replace
 from math import degrees
 
 import pytest
@@ -64,13 +65,16 @@ def test_any_line_ends_and_any_form_of_the_name_are_read(end: str, name: tuple[s
         ((TWO, ONE), "line 1: the two lines are swapped: line 2 stands before line 1"),
         ((ONE, OTHER_TWO), "line 2: catalogue number 41335 does not match 25544 of line 1"),
         ((ONE[:60], TWO), "line 1: 60 characters, an element line has 69"),
-        ((ONE, TWO + " 0.0 1440.0"), "line 2: 80 characters, an element line has 69"),
+        ((ONE, TWO + "0"), "line 2: 70 characters, an element line has 69"),
+        ((ONE, TWO[:-1]), "line 2: 68 characters, an element line has 69"),
+        ((ONE[:-1], TWO), "line 1: 68 characters, an element line has 69"),
+        ((ONE[:-1], TWO[:60]), "line 2: 60 characters, an element line has 69"),
         ((ONE,), "line 1: line 1 of an element set without the other line"),
         ((TWO,), "line 1: line 2 of an element set without the other line"),
         (("No GP data found",), "line 1: 'No GP data found' is neither an element line nor the name of a set below it"),
         ((ONE, edited(TWO, 9, " 5x.6412")), "line 2: inclination (columns 9-16) is '5x.6412', not a number"),
         ((ONE, edited(TWO, 9, "190.6412")), "line 2: inclination 190.6412 deg; it must lie in 0..180"),
-        ((ONE, edited(TWO, 27, " 00567 ")), "line 2: eccentricity (columns 27-33) is ' 00567 ', not 7 digits"),
+        ((ONE, edited(TWO, 27, "0.00567")), "line 2: eccentricity (columns 27-33) is '0.00567', not 7 digits"),
         ((ONE, edited(TWO, 53, "        nan")), "line 2: mean motion (columns 53-63) is 'nan', not a number"),
         ((ONE, edited(TWO, 53, " 0.00000000")), "line 2: mean motion 0.0 revolutions a day; it must be positive"),
         ((ONE, edited(TWO, 17, "2")), "line 2: column 17 must be blank: the numbers are not in their columns"),
@@ -122,6 +126,83 @@ def test_an_epoch_of_57_is_1957_and_of_56_is_2056() -> None:
     [old, new], [] = parse(edited(ONE, 19, "57"), TWO, edited(ONE, 19, "56"), TWO)
     assert utc_text(old.epoch_tai_s)[:4] == "1957"
     assert utc_text(new.epoch_tai_s)[:4] == "2056"
+
+
+@pytest.mark.parametrize(
+    ("line", "name"),
+    [
+        *(("2 PATHFINDER", "2 PATHFINDER"), ("1 KUNS-SAT", "1 KUNS-SAT"), ("1 12345", "1 12345"), ("0 2 X", "2 X")),
+        *(("2 25544 DEB", "2 25544 DEB"), ("1 A1234 SAT", "1 A1234 SAT"), ("0 1 HOPEFUL", "1 HOPEFUL")),
+        *(("0", ""), ("0 ", ""), ("\tISS\t", "ISS"), ("ISS\t(ZARYA)", "ISS (ZARYA)"), ("\xa0ISS\xa0", "ISS")),
+        *(("iss (zarya)", "iss (zarya)"), ("1", "1"), ("2", "2"), ("1998-067A", "1998-067A")),
+        (
+            "1 " + "LONG NAME OF AN OBJECT THAT A PERSON WROTE DOWN BY HAND",
+            "1 LONG NAME OF AN OBJECT THAT A PERSON WROTE DOWN BY HAND",
+        ),
+    ],
+)
+def test_a_name_may_look_like_an_element_line_or_be_none(line: str, name: str) -> None:
+    sets, problems = parse("SENTINEL-3A", OTHER_ONE, OTHER_TWO, line, ONE, TWO, "SENTINEL-3A", OTHER_ONE, OTHER_TWO)
+    assert problems == []
+    assert [one.name for one in sets] == ["SENTINEL-3A", name, "SENTINEL-3A"]
+
+
+def small(line: str) -> str:
+    return line.lower()
+
+
+@pytest.mark.parametrize(
+    ("one", "two"),
+    [
+        (small(ONE), TWO),
+        (small(edited(ONE, 3, "T0001")), small(edited(TWO, 3, "T0001"))),
+        ("  " + ONE + "  \t", "\t" + TWO),
+        (ONE + " ", TWO + " 0.0 1440.0 1.0"),
+        (edited(ONE, 54, " 12771 -3".replace(" -", "-")), edited(TWO, 27, "   5670")),
+        (edited(ONE, 45, "        "), TWO),
+        (edited(ONE, 54, "+12771-3"), TWO),
+        (ONE.replace("98067A   22041", "98067A\t  22041"), TWO.replace("25544  51", "25544\t 51")),
+        (ONE.replace("22041.55493323  .", "22041.55493323\t ."), TWO),
+        (ONE.replace(" ", "\t", 2), TWO.replace(" ", "\t", 1)),
+        (ONE + "\x1a", TWO + "\x1a"),
+    ],
+)
+def test_sets_are_read_as_people_have_them(one: str, two: str) -> None:
+    [found], [] = parse(one, two)
+    [same], [] = parse(ONE, TWO)
+    assert found.mean_motion_rad_s == same.mean_motion_rad_s
+    assert found.epoch_tai_s == same.epoch_tai_s
+    assert found.bstar_per_radius == same.bstar_per_radius
+    assert found.eccentricity == same.eccentricity
+    assert found.norad_id in (25544, 270001)
+
+
+@pytest.mark.parametrize(("one_length", "two_length"), [(68, 68), (64, 63), (61, 68), (67, 63)])
+def test_sets_without_checksums_are_read_with_a_note(one_length: int, two_length: int) -> None:
+    [found], [note] = parse(NAME, ONE[:one_length], TWO[:two_length])
+    [same], [] = parse(NAME, ONE, TWO)
+    assert replace(found, name=NAME) == same
+    assert (note.kind, note.norad_ids) == ("note", (25544,))
+    assert str(note) == "sats.tle, line 2: no checksum at the ends of the lines: damage would not be noticed"
+
+
+def test_the_verification_lines_with_start_stop_and_step_after_the_set_are_read() -> None:
+    one = "1 00005U 58002B   00179.78495062  .00000023  00000-0  28098-4 0  4753"
+    two = "2 00005  34.2682 348.7242 1859667 331.7664  19.3264 10.82419157413667     0.00      4320.0        360.00 "
+    [found], [] = parse(one, two)
+    assert found.norad_id == 5
+
+
+def test_text_around_the_sets_is_text_and_a_damaged_set_says_whose_it_is() -> None:
+    template = "1 AAAAAU 00  0  0 BBBBB.BBBBBBBB  .CCCCCCCC  00000-0  00000-0 0  DDDZ"
+    _, problems = parse("SB KEPS @ AMSAT", template, "TO ALL", "AO-07", ONE[:-1] + "5", TWO, "/EX")
+    assert [(one.kind, one.name, one.norad_ids) for one in problems] == [
+        ("text", "SB KEPS @ AMSAT", ()),
+        ("text", template, ()),
+        ("text", "TO ALL", ()),
+        ("lost", "AO-07", (25544, 25544)),
+        ("text", "/EX", ()),
+    ]
 
 
 @needs_data

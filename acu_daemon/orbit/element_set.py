@@ -49,12 +49,18 @@ class ElementSet:
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """Why one set of a file was left out."""
+    """Why one set of a file was left out; or text that is none, or what to know of a set that was read all the same.
+
+    norad_id, name: of the set, as far as they can be read.
+    """
 
     file: str
     line: int | None
     reason: str
     record: int | None = None
+    norad_ids: tuple[int, ...] = ()
+    name: str = ""
+    kind: Literal["lost", "text", "note"] = "lost"
 
     def __str__(self) -> str:
         return f"{place(self.file, self.line, self.record)}: {self.reason}"
