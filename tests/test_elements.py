@@ -7,8 +7,9 @@ import pytest
 
 from acu_daemon.errors import ElementsError
 from acu_daemon.orbit.brouwer import BrouwerElements
-from acu_daemon.orbit.element_set import rad_s_from_rev_day
-from acu_daemon.orbit.elements import ElementLimits, ElementSet, check_brouwer, check_elements, select_elements
+from acu_daemon.orbit.element_set import ElementSet, rad_s_from_rev_day
+from acu_daemon.orbit.elements import ElementLimits, check_brouwer, check_elements
+from acu_daemon.orbit.selection import select_elements
 from acu_daemon.orbit.tle import parse_tle
 from acu_daemon.units import DAY_S
 
@@ -39,7 +40,8 @@ def test_an_epoch_60_days_old_is_refused_with_file_line_and_reason() -> None:
     [error], [] = check_elements(ISS, LIMITS, aged(60.0))
     assert error == (
         "iss.tle, line 2: ISS (ZARYA) (25544): the epoch 2022-02-10T13:19:06Z is 60.0 days old, the limit is 30 days; "
-        "fetch newer elements"
+        "fetch newer elements: expected error about 730 s along the track, 86 deg overhead (max_age_days = 30, the "
+        "default; set it in [elements.limits] of the satellite's file)"
     )
 
 
@@ -110,25 +112,37 @@ HISTORY = [replace(ISS, epoch_tai_s=aged(days), line=line) for line, days in enu
 OTHER = replace(ISS, name="SENTINEL-3A", norad_id=41335)
 
 
-def test_the_newest_set_not_after_now_is_chosen() -> None:
-    assert select_elements(HISTORY, 25544, None, aged(1.0)) == (HISTORY[1], [])
+@pytest.mark.parametrize(
+    ("now_days", "line"),
+    [(1.0, 1), (1.1, 3), (0.6, 1), (-0.5, 2), (-1.4, 2), (-1.6, 0), (-5.0, 0), (9.0, 3), (-1.5, 0)],
+)
+def test_the_set_nearest_in_time_is_chosen_before_or_after_now_and_the_older_of_two_as_near(
+    now_days: float, line: int
+) -> None:
+    selected = select_elements(HISTORY, 25544, None, aged(now_days))
+    assert selected.elements.line == line
+    assert selected.warnings == []
 
 
-def test_before_every_epoch_the_oldest_set_is_chosen_with_a_warning() -> None:
-    one, [warning] = select_elements(HISTORY, None, None, aged(-5.0))
-    assert one is HISTORY[0]
-    assert "every epoch is ahead of the clock, the oldest (2022-02-08T13:19:06Z) is used" in warning
+def test_which_of_several_sets_is_used_and_why_is_said() -> None:
+    selected = select_elements([HISTORY[0], HISTORY[1]], 25544, None, aged(-0.1))
+    assert selected.why == (
+        "iss.tle, line 1: ISS (ZARYA) (25544): of 2 sets the one of 2022-02-10T13:19:06Z is used, 2.4 h after "
+        "2022-02-10T10:55:06Z: nearest in time, so its expected error is the least; the next is 45.6 h before "
+        "2022-02-10T10:55:06Z"
+    )
+    assert select_elements([ISS, ISS], 25544, None, NOW).why == ""
 
 
 def test_a_file_with_one_satellite_needs_neither_number_nor_name() -> None:
-    assert select_elements([ISS], None, None, NOW)[0] is ISS
-    assert select_elements([ISS], None, "my own name", NOW)[0] is ISS
+    assert select_elements([ISS], None, None, NOW).elements is ISS
+    assert select_elements([ISS], None, "my own name", NOW).elements is ISS
 
 
 @pytest.mark.parametrize("name", ["SENTINEL-3A", "sentinel 3a", "Sentinel3A"])
 def test_a_list_is_searched_by_number_else_by_name(name: str) -> None:
-    assert select_elements([ISS, OTHER], None, name, NOW)[0] is OTHER
-    assert select_elements([ISS, OTHER], 25544, name, NOW)[0] is ISS
+    assert select_elements([ISS, OTHER], None, name, NOW).elements is OTHER
+    assert select_elements([ISS, OTHER], 25544, name, NOW).elements is ISS
 
 
 @pytest.mark.parametrize(
@@ -146,10 +160,36 @@ def test_a_satellite_that_is_not_in_the_list_is_an_error_that_says_what_is(
         select_elements([ISS, OTHER], norad_id, name, NOW)
 
 
-def test_a_long_list_is_named_by_its_first_few() -> None:
-    many = [replace(ISS, norad_id=number) for number in range(1, 21)]
-    with pytest.raises(ElementsError, match=r"\(5\) and 15 more$"):
-        select_elements(many, 99, None, NOW)
+LIST = [
+    replace(ISS, name=name, norad_id=number)
+    for name, number in [*((f"STARLINK-{k}", 44000 + k) for k in range(2000, 4000, 7)), ("NOAA 19 [+]", 33591), ("", 5)]
+]
+
+
+@pytest.mark.parametrize(
+    ("norad_id", "name", "meant"),
+    [
+        (33951, "NOAA 19", "NOAA 19 [+] (33591)"),
+        (1, "noaa-19 [+]", "NOAA 19 [+] (33591)"),
+        (None, "NOAA 19", "NOAA 19 [+] (33591)"),
+        (None, "NOAA 18 [+]", "NOAA 19 [+] (33591)"),
+        (33591 + 10000, "my own", "NOAA 19 [+] (33591)"),
+    ],
+)
+def test_a_satellite_that_is_not_in_a_long_list_is_told_with_what_may_be_meant(
+    norad_id: int | None, name: str, meant: str
+) -> None:
+    with pytest.raises(ElementsError) as error:
+        select_elements(LIST, norad_id, name, NOW)
+    assert f"did you mean {meant}" in str(error.value)
+    assert str(error.value).endswith(
+        "the file holds 288 satellites, such as STARLINK-2000 (46000), STARLINK-2007 (46007)"
+    )
+
+
+def test_nothing_is_suggested_where_nothing_is_near() -> None:
+    with pytest.raises(ElementsError, match=r"^iss.tle: no element set with norad_id 99; the file holds 288"):
+        select_elements(LIST, 99, "my own", NOW)
 
 
 def test_a_name_that_two_satellites_bear_is_an_error() -> None:

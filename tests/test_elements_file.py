@@ -81,7 +81,7 @@ def test_a_list_is_searched_by_number_else_by_name(tmp_path: Path) -> None:
     assert load(tmp_path, tle("Iss (Zarya)"), both).label == "ISS (ZARYA) (25544)"
     assert load(tmp_path, tle("jason 1"), both).label == "JASON-1 (26997)"
     assert refusal(tmp_path, tle("ISS", 7), both) == (
-        "DIR/satellites/../lists/active.txt: no element set with norad_id 7; "
+        "DIR/satellites/../lists/active.txt: no element set with norad_id 7 (did you mean ISS (ZARYA) (25544)?); "
         "the file holds JASON-1 (26997), ISS (ZARYA) (25544)"
     )
     assert "no element set with name 'ZARYA'" in refusal(tmp_path, tle("ZARYA"), both)
@@ -97,7 +97,8 @@ def test_line_ends_of_other_systems_do_not_matter(tmp_path: Path, ends: str) -> 
 def test_elements_60_days_old_are_refused_and_10_days_old_warned_of(tmp_path: Path) -> None:
     [error] = load(tmp_path, tle("ISS"), now=NOW + 60 * DAY_S).errors
     assert error.startswith(f"{tmp_path}/satellites/../lists/active.txt, line 2: ISS (ZARYA) (25544): the epoch")
-    assert error.endswith("60.4 days old, the limit is 30 days; fetch newer elements")
+    assert "60.4 days old, the limit is 30 days; fetch newer elements: expected error about " in error
+    assert "(max_age_days = 30, the default; set it in [elements.limits] of the satellite's file)" in error
     older = load(tmp_path, tle("ISS"), now=NOW + 12 * DAY_S)
     assert older.errors == []
     assert "12.4 days old" in older.warnings[0]
@@ -125,7 +126,7 @@ def test_a_bad_set_of_another_satellite_is_only_warned_of(tmp_path: Path) -> Non
 def test_when_the_own_set_is_the_bad_one_the_only_other_satellite_is_not_taken_for_it(
     tmp_path: Path, satellite: str
 ) -> None:
-    said, why = refusal(tmp_path, satellite, JASON + bad(ISS)).splitlines()
+    why, said = refusal(tmp_path, satellite, JASON + bad(ISS)).splitlines()
     assert "no element set with n" in said
     assert "the file holds JASON-1 (26997)" in said
     assert "active.txt, line 6: checksum 6, computed" in why

@@ -178,7 +178,11 @@ def _satellite(config: Path, name: str, now_tai_s: float) -> Iterator[Finding]:
     if elements.errors:
         yield Finding(NO_GO, f"{name}: elements", "; ".join(elements.errors))
         return
-    yield Finding(WARN if elements.warnings else GO, f"{name}: elements", "; ".join([*elements.warnings, age]))
+    yield Finding(
+        WARN if elements.warnings else GO,
+        f"{name}: elements",
+        "; ".join(told),
+    )
     try:
         yield from _next_pass(name, target, now_tai_s)
     except OrbitError as error:

@@ -1,7 +1,8 @@
 """From a satellite's TOML to a propagator: reads the file of elements it names, chooses the set, checks it."""
 
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from acu_daemon.config_tables import BrouwerSection, ElementsFileSection, SatelliteFile
@@ -9,18 +10,14 @@ from acu_daemon.edge.state import refuse_world_writable
 from acu_daemon.errors import ElementsError
 from acu_daemon.model import EarthOrientation
 from acu_daemon.orbit.brouwer import BrouwerElements, BrouwerPropagator
-from acu_daemon.orbit.elements import (
-    Problem,
-    check_brouwer,
-    check_elements,
-    check_ephemeris,
-    select_elements,
-    select_segments,
-)
+from acu_daemon.orbit.contents import binary_kind, decoded, kind_of, what_else
+from acu_daemon.orbit.element_set import ElementSet, Problem
+from acu_daemon.orbit.elements import check_brouwer, check_elements, check_ephemeris
 from acu_daemon.orbit.ephemeris import Ephemeris, OemPropagator
 from acu_daemon.orbit.oem import parse_oem
 from acu_daemon.orbit.omm import parse_omm
 from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.orbit.selection import is_of, select_elements, select_segments
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator
 from acu_daemon.orbit.tle import parse_tle
 from acu_daemon.units import DEG
@@ -29,7 +26,7 @@ NAMED_PROBLEMS = 5
 RECENT_S = 2.0  # a file that changed within this time may still be in the writing: so long it is read again
 AGAIN_S = 0.2
 _NO_ORIENTATION = EarthOrientation()
-_PARSERS = {"tle": parse_tle, "omm": parse_omm}
+_PARSERS: dict[str, Callable[[str, str], tuple[list[ElementSet], list[Problem]]]] = {"tle": parse_tle, "omm": parse_omm}
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,9 +80,19 @@ def _load(satellite: SatelliteFile, toml_path: Path, now_tai_s: float, orientati
     section = satellite.elements
     if isinstance(section, BrouwerSection):
         return _from_brouwer(satellite, section, toml_path, now_tai_s)
-    if section.kind == "oem":
-        return _from_ephemeris(satellite, section, toml_path, now_tai_s, orientation)
-    return _from_file(satellite, section, toml_path, now_tai_s)
+    path, text = _read(section, toml_path)
+    kind = kind_of(text)
+    if kind is None:
+        raise ElementsError(f"{path}: {what_else(text)}")
+    loaded = (
+        _from_ephemeris(satellite, section, path, text, now_tai_s, orientation)
+        if kind == "oem"
+        else _from_sets(satellite, section, path, text, now_tai_s, _PARSERS[kind])
+    )
+    if kind == section.kind:
+        return loaded
+    said = f'{toml_path}: elements.kind = "{section.kind}", but {path} is of kind "{kind}" and read as that'
+    return replace(loaded, warnings=[said, *loaded.warnings])
 
 
 def _from_brouwer(
@@ -106,31 +113,45 @@ def _from_brouwer(
     return LoadedElements(propagator, elements.name, elements.epoch_tai_s, errors, warnings)
 
 
-def _from_file(
-    satellite: SatelliteFile, section: ElementsFileSection, toml_path: Path, now_tai_s: float
+def _from_sets(
+    satellite: SatelliteFile,
+    section: ElementsFileSection,
+    path: Path,
+    text: str,
+    now_tai_s: float,
+    parse: Callable[[str, str], tuple[list[ElementSet], list[Problem]]],
 ) -> LoadedElements:
-    path, text = _read(section, toml_path)
-    sets, problems = _PARSERS[section.kind](text, str(path))
-    if not sets:
-        raise ElementsError("\n".join(_few(problems)) or f"{path}: no element set in the file")
+    sets, problems = parse(text, str(path))
     wanted = satellite.satellite
+    lost = [one for one in problems if one.kind == "lost"]
+    own = [one for one in problems if one.kind != "note" and is_of(one, wanted.norad_id, wanted.name)]
+    if not sets:
+        raise ElementsError("\n".join(_few([*own, *_others(lost, own)] or problems)))
     try:
-        chosen, warnings = select_elements(sets, wanted.norad_id, wanted.name, now_tai_s, is_whole=not problems)
+        selected = select_elements(sets, wanted.norad_id, wanted.name, now_tai_s, is_whole=not (lost or own))
     except ElementsError as error:
-        raise ElementsError("\n".join([str(error), *_few(problems)])) from None
+        raise ElementsError("\n".join([*_few(own), str(error), *_few(_others(lost, own))])) from None
+    chosen = selected.elements
+    notes = [one for one in problems if one.kind == "note" and one.line == chosen.line and one.record == chosen.record]
     errors, more = check_elements(chosen, section.limits.limits(), now_tai_s)
-    warnings = [*warnings, *more, *_few(problems)]
-    return LoadedElements(Sgp4Propagator(chosen), chosen.label, chosen.epoch_tai_s, errors, warnings)
+    warnings = [*selected.warnings, *more, *map(str, notes), *_few([*own, *_others(lost, own)])]
+    return LoadedElements(
+        Sgp4Propagator(chosen), chosen.label, chosen.epoch_tai_s, errors, warnings, choice=selected.why
+    )
+
+
+def _others(problems: list[Problem], own: list[Problem]) -> list[Problem]:
+    return [one for one in problems if one not in own]
 
 
 def _from_ephemeris(
     satellite: SatelliteFile,
     section: ElementsFileSection,
-    toml_path: Path,
+    path: Path,
+    text: str,
     now_tai_s: float,
     orientation: EarthOrientation,
 ) -> LoadedElements:
-    path, text = _read(section, toml_path)
     segments, problems = parse_oem(text, str(path))
     if not segments:
         raise ElementsError("\n".join(_few(problems, "segments")))
@@ -151,12 +172,16 @@ def _from_ephemeris(
 
 
 def _read(section: ElementsFileSection, toml_path: Path) -> tuple[Path, str]:
+    """The file's text.  ElementsError: it cannot be read, or is none."""
     path = toml_path.parent / section.file
     refuse_world_writable(path)
     try:
-        return path, path.read_text(encoding="utf-8", errors="replace")
+        data = path.read_bytes()
     except OSError as error:
         raise ElementsError(f"{toml_path}: elements.file = {section.file!r}: {path}: {error.strerror}") from None
+    if what := binary_kind(data):
+        raise ElementsError(f"{path}: {what}; a file of elements is text")
+    return path, decoded(data)
 
 
 def _few(problems: list[Problem], what: str = "element sets") -> list[str]:
