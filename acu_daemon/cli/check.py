@@ -178,6 +178,7 @@ def _satellite(config: Path, name: str, now_tai_s: float) -> Iterator[Finding]:
     if elements.errors:
         yield Finding(NO_GO, f"{name}: elements", "; ".join(elements.errors))
         return
+    told = [*elements.warnings, age, *([elements.choice] if elements.choice else [])]
     yield Finding(
         WARN if elements.warnings else GO,
         f"{name}: elements",
