@@ -167,7 +167,7 @@ def _from_ephemeris(
         propagator.ephemeris.label,
         propagator.epoch_tai_s,
         errors,
-        [*doubts, *warnings, *_few(problems, "segments")],
+        [*doubts, *warnings, *(note for one in segments for note in one.notes), *_few(problems, "segments")],
     )
 
 

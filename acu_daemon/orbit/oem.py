@@ -6,7 +6,6 @@ by its own method.  Only the Earth as centre, and frames and time systems that a
 
 import re
 from dataclasses import dataclass, field
-from datetime import date, timedelta
 from math import isfinite
 from typing import Literal
 
@@ -14,25 +13,23 @@ import numpy as np
 
 from acu_daemon.orbit.element_set import Problem, place
 from acu_daemon.orbit.oem_text import BadSegmentError, RawSegment, read_segments
-from acu_daemon.orbit.timescales import tai_from_utc, unix_from_tai
+from acu_daemon.orbit.timescales import TIME_SYSTEMS, tai_from_ccsds
 from acu_daemon.units import Array
 
 Frame = Literal["TEME", "TOD", "EME2000", "GCRF", "ITRF"]
 
 _FRAMES: tuple[tuple[str, Frame], ...] = (
-    (r"TEME(OFDATE)?", "TEME"),
-    (r"TOD(_EARTH)?", "TOD"),
+    (r"TEME(_?OF_?DATE)?", "TEME"),
+    (r"TOD(_EARTH)?|TRUE_?OF_?DATE", "TOD"),
     (r"EME2000|J2000", "EME2000"),
     (r"GCRF\d?|ICRF\d?", "GCRF"),
     (r"ITRF-?(\d\d|\d{4})?|WGS84", "ITRF"),
 )
 SUPPORTED_FRAMES = "TEME, TOD, EME2000, GCRF, ICRF, ITRF and ITRFyyyy"
 _OF_DATE = ("TEME", "TOD")
-_UNIFORM_MINUS_TAI_S = {"TAI": 0.0, "GPS": -19.0, "TT": 32.184}
-_SUPPORTED_TIMES = "UTC, TAI, TT, GPS"
 _LEAST_STATES = 2
+_SAME = np.array([1.0, 1.0, 1.0, 1e-3, 1e-3, 1e-3])  # metres, m/s: by so much a state that stands twice may differ
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
-_DAY_OF_YEAR = re.compile(r"(\d{4})-(\d{3})(T.*)", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +51,7 @@ class OemSegment:
     v_m_s: Array = field(repr=False)
     file: str
     line: int
+    notes: tuple[str, ...] = ()  # what was left out of it
 
     @property
     def label(self) -> str:
@@ -96,11 +94,8 @@ def _segment(raw: RawSegment, file: str) -> OemSegment:
     if len(raw.states) < _LEAST_STATES:
         raise BadSegmentError(f"{len(raw.states)} states in the segment, at least {_LEAST_STATES} are needed", raw.line)
     tai_s = np.array([epoch_tai_s(epoch, system, line) for line, epoch, _ in raw.states])
-    falling = np.flatnonzero(np.diff(tai_s) <= 0.0)
-    if falling.size:
-        line, epoch, _ = raw.states[int(falling[0]) + 1]
-        raise BadSegmentError(f"the times must rise, {epoch} does not", line)
     states = np.array([numbers(values, line) for line, _, values in raw.states]) * 1e3
+    tai_s, states, notes = _without_repeats(raw, tai_s, states)
     start_tai_s, end_tai_s = _span_tai_s(raw, system, tai_s)
     return OemSegment(
         version=raw.version,
@@ -115,7 +110,27 @@ def _segment(raw: RawSegment, file: str) -> OemSegment:
         v_m_s=states[:, 3:].copy(),
         file=file,
         line=raw.line,
+        notes=tuple(f"{place(file, line, None)}: {text}" for line, text in [*raw.notes, *notes]),
     )
+
+
+def _without_repeats(raw: RawSegment, tai_s: Array, states: Array) -> tuple[Array, Array, list[tuple[int, str]]]:
+    """Leave out states that stand twice in a row, with a note; times that fall or have two states are refused."""
+    steps_s = np.diff(tai_s)
+    is_same = np.all(np.abs(np.diff(states, axis=0)) <= _SAME, axis=1) & (steps_s == 0.0)
+    bad = np.flatnonzero((steps_s <= 0.0) & ~is_same)
+    if bad.size:
+        line, epoch, _ = raw.states[int(bad[0]) + 1]
+        two = ": two states at one time, and they differ" if steps_s[bad[0]] == 0.0 else ""
+        raise BadSegmentError(f"the times must rise, {epoch} does not{two}", line)
+    twice = np.flatnonzero(is_same) + 1
+    if not twice.size:
+        return tai_s, states, []
+    if tai_s.size - twice.size < _LEAST_STATES:
+        raise BadSegmentError("one state only, it stands several times", raw.line)
+    what = "this state stands" if twice.size == 1 else f"{twice.size} states, this the first, stand"
+    notes = [(raw.states[int(twice[0])][0], f"{what} twice: the second is left out")]
+    return np.delete(tai_s, twice), np.delete(states, twice, axis=0), notes
 
 
 def _frame(raw: RawSegment) -> Frame:
@@ -140,8 +155,8 @@ def frame_named(name: str) -> Frame | None:
 def time_system(raw: RawSegment) -> str:
     """The segment's TIME_SYSTEM.  BadSegmentError: none, or one that is not known here."""
     system = required(raw, "TIME_SYSTEM").upper()
-    if system != "UTC" and system not in _UNIFORM_MINUS_TAI_S:
-        raise BadSegmentError(f"TIME_SYSTEM is {system[:40]!r}; {_SUPPORTED_TIMES} can be used", raw.line)
+    if system not in TIME_SYSTEMS:
+        raise BadSegmentError(f"TIME_SYSTEM is {system[:40]!r}; {', '.join(TIME_SYSTEMS)} can be used", raw.line)
     return system
 
 
@@ -174,35 +189,17 @@ def _created_tai_s(raw: RawSegment) -> float | None:
 
 
 def epoch_tai_s(text: str, system: str, line: int) -> float:
-    """Read YYYY-MM-DDThh:mm:ss[.fff][Z] or YYYY-DDDThh:mm:ss[.fff][Z]."""
+    """Read a time of a message.  BadSegmentError: it is none."""
     try:
-        tai_s = tai_from_utc(_calendar(text).removesuffix("Z") + "Z")
+        return tai_from_ccsds(text, system)
     except ValueError as error:
         raise BadSegmentError(f"{text[:40]!r} is not a time: {error}", line) from None
-    if system == "UTC":
-        return tai_s
-    as_uniform_s = unix_from_tai(tai_s) - unix_from_tai(tai_from_utc("2000-01-01T12:00:00Z"))
-    return as_uniform_s - _UNIFORM_MINUS_TAI_S[system]
-
-
-def _calendar(text: str) -> str:
-    """Turn a day of the year into month and day; other texts as they are.  ValueError: no such day."""
-    match = _DAY_OF_YEAR.fullmatch(text)
-    if match is None:
-        return text
-    year, day = int(match[1]), int(match[2])
-    try:
-        found = date(year, 1, 1) + timedelta(days=day - 1)
-    except (ValueError, OverflowError):
-        raise ValueError("no such date") from None
-    if found.year != year:
-        raise ValueError(f"{year} has no day {day}")
-    return f"{found.isoformat()}{match[3]}"
 
 
 def numbers(values: list[str], line: int) -> list[float]:
     """Finite numbers.  BadSegmentError: a text that is none."""
-    for text in values:
+    plain = [text.upper().replace("D", "E") for text in values]  # as Fortran writes exponents
+    for text in plain:
         if _NUMBER.fullmatch(text) is None or not isfinite(float(text)):
-            raise BadSegmentError(f"{text[:40]!r} is not a number", line)
-    return [float(text) for text in values]
+            raise BadSegmentError(f"{values[plain.index(text)][:40]!r} is not a number", line)
+    return [float(text) for text in plain]

@@ -4,8 +4,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 from xml.parsers import expat
+from xml.parsers.expat import errors
 
 STATE_KEYS = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
+_CUT = (errors.XML_ERROR_NO_ELEMENTS, errors.XML_ERROR_UNCLOSED_TOKEN, errors.XML_ERROR_PARTIAL_CHAR)
 
 
 class BadSegmentError(ValueError):
@@ -25,6 +27,7 @@ class RawSegment:
     created: str
     fields: dict[str, str] = field(default_factory=dict)
     states: list[tuple[int, str, list[str]]] = field(default_factory=list)  # line, epoch, six numbers
+    notes: list[tuple[int, str]] = field(default_factory=list)  # line, what to know of it
     problem: BadSegmentError | None = None
 
 
@@ -39,6 +42,7 @@ class Layout:
     counts: tuple[int, ...]  # of values after the epoch in a line of KVN
     kept: int  # the first of these
     values: Callable[[Mapping[str, str]], list[str]]  # from the leaves of a row; KeyError: names what is missing
+    is_read_cut: bool = False  # what is before the cut of a file, with a note
 
 
 OEM = Layout(
@@ -49,6 +53,7 @@ OEM = Layout(
     counts=(6, 9),
     kept=6,
     values=lambda leaves: [leaves[key] for key in STATE_KEYS],
+    is_read_cut=True,
 )
 
 
@@ -61,11 +66,13 @@ def _read_kvn(text: str, layout: Layout) -> list[RawSegment]:
     found: list[RawSegment] = []
     where: Literal["header", "meta", "data", "covariance"] = "header"
     version = created = ""
+    last_line = 0
     for number, raw_line in enumerate(text.split("\n"), start=1):
         line = raw_line.strip()
-        word = line.split(maxsplit=1)[0] if line else "COMMENT"
+        word = line.split(maxsplit=1)[0].upper() if line else "COMMENT"
         if word == "COMMENT":
             continue
+        last_line = number
         if word == "META_START":
             found.append(RawSegment(number, version, created))
             where = "meta"
@@ -83,13 +90,34 @@ def _read_kvn(text: str, layout: Layout) -> list[RawSegment]:
             _take_field(found[-1], line, number)
         elif where == "data" and found:
             _take_state(found[-1], line, number, layout)
+    if layout.is_read_cut and found and where == "data":
+        _drop_cut_line(found[-1], last_line, has_end=text.endswith("\n"))
     return found
+
+
+def _drop_cut_line(raw: RawSegment, last_line: int, *, has_end: bool) -> None:
+    """Of a file that was cut in its last line the states before it are whole.
+
+    A line with all its numbers is cut too where the file has no last line end and the last number has lost digits.
+    """
+    note = (last_line, "the file ends within this line: the state is left out")
+    if raw.problem is not None:
+        if raw.problem.line == last_line and raw.states:
+            raw.problem = None
+            raw.notes.append(note)
+        return
+    if has_end or len(raw.states) < 2 or raw.states[-1][0] != last_line:
+        return
+    before, last = (len(state[2][-1].partition(".")[2]) for state in raw.states[-2:])
+    if last < before:
+        del raw.states[-1]
+        raw.notes.append(note)
 
 
 def _take_field(raw: RawSegment, line: str, number: int) -> None:
     key, equals, value = (part.strip() for part in line.partition("="))
     if equals and key:
-        raw.fields[key] = value
+        raw.fields[key.upper()] = value
     else:
         raw.problem = raw.problem or BadSegmentError(f"{line[:40]!r} is not KEY = VALUE", number)
 
@@ -109,7 +137,10 @@ def _read_xml(text: str, layout: Layout) -> list[RawSegment]:
     try:
         reader.parser.Parse(text, True)
     except expat.ExpatError as error:
-        raise BadSegmentError(f"not XML: {expat.ErrorString(error.code)}", error.lineno) from None
+        is_cut = layout.is_read_cut and expat.ErrorString(error.code) in _CUT
+        if not is_cut or not any(raw.states for raw in reader.found):
+            raise BadSegmentError(f"not XML: {expat.ErrorString(error.code)}", error.lineno) from None
+        reader.found[-1].notes.append((error.lineno, "the file ends here: the states before it are used"))
     except UnicodeEncodeError:
         raise BadSegmentError("not XML: characters that are none", None) from None
     return reader.found

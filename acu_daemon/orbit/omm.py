@@ -1,6 +1,6 @@
-"""Orbit mean-elements messages (CCSDS 502.0) as CelesTrak serves them: KVN, XML, JSON and CSV, one or a list.
+"""Orbit mean-elements messages (CCSDS 502.0) as people have them: KVN, XML, JSON and CSV, one or many in a file.
 
-Only messages made for SGP4 are taken: theory SGP4 or SGP/SGP4, frame TEME, times in UTC.
+Only messages made for SGP4 are taken: theory SGP4 (or SGP, SDP4), frame TEME; an EPHEMERIS_TYPE of SGP4-XP is refused.
 """
 
 import csv
@@ -9,22 +9,28 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from math import isfinite
+from typing import Any
 from xml.etree import ElementTree
 
 from acu_daemon.orbit.element_set import ElementSet, Problem, rad_s_from_rev_day
-from acu_daemon.orbit.timescales import tai_from_utc
+from acu_daemon.orbit.timescales import TIME_SYSTEMS, tai_from_ccsds
 from acu_daemon.orbit.tle import catalogue_number
 from acu_daemon.units import DEG
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
+_WHOLE = re.compile(r"(\d+)\.0*", re.ASCII)
 _FORBIDDEN_XML = re.compile(r"<!\s*(DOCTYPE|ENTITY)", re.IGNORECASE)
-_REQUIRED_WORDS = {
-    "MEAN_ELEMENT_THEORY": ("SGP4", "SGP/SGP4"),
-    "REF_FRAME": ("TEME",),
-    "TIME_SYSTEM": ("UTC",),
-    "CENTER_NAME": ("EARTH",),
-    "EPHEMERIS_TYPE": ("0", "2", "3"),  # 4 is SGP4-XP
+_REQUIRED_WORDS = {  # what a field may be, without blanks, hyphens and underscores, and what is said else
+    "MEAN_ELEMENT_THEORY": (r"(SGP4?|SDP4)([/,+](SGP4?|SDP4))*", "SGP4 or SGP/SGP4"),
+    "REF_FRAME": (r"TEME(OFDATE)?|TRUEEQUATORMEANEQUINOX(OFDATE)?|TOD|TRUEOFDATE", "TEME"),
+    "TIME_SYSTEM": ("|".join(TIME_SYSTEMS), " or ".join(TIME_SYSTEMS)),
+    "CENTER_NAME": ("EARTH", "EARTH"),
+    "EPHEMERIS_TYPE": (r"0*[023]?(\.0*)?|SGP4?", "0 or 2 or 3"),  # 4 is SGP4-XP
 }
+_TRUE_OF_DATE = ("TOD", "TRUEOFDATE")
+_OF_A_RECORD = ("EPOCH", "MEAN_MOTION", "NORAD_CAT_ID", "ECCENTRICITY")
+_JSON_BETWEEN = re.compile(r"[\s,\[\]]*")
+_IGNORED_KVN = ("COMMENT", "META_START", "META_STOP", "DATA_START", "DATA_STOP")
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,10 +62,19 @@ def parse_omm(text: str, file: str) -> tuple[list[ElementSet], list[Problem]]:
         if isinstance(item, _BadRecordError):
             problems.append(Problem(file, item.line, str(item), item.record))
             continue
+        number = _catalogue_number(item.fields.get("NORAD_CAT_ID", ""))
+        name = item.fields.get("OBJECT_NAME", "")
+        numbers = () if number is None else (number,)
         try:
             sets.append(_element_set(item, file))
         except _BadRecordError as error:
-            problems.append(Problem(file, item.line, str(error), item.record))
+            problems.append(Problem(file, item.line, str(error), item.record, numbers, name))
+            continue
+        if _plain(item.fields.get("REF_FRAME", "")) in _TRUE_OF_DATE:
+            reason = (
+                f"REF_FRAME is {item.fields['REF_FRAME'][:40]!r}, read as TEME: elements of SGP4 are of no other frame"
+            )
+            problems.append(Problem(file, item.line, reason, item.record, numbers, name, "note"))
     if not sets and not problems:
         problems.append(Problem(file, None, "no orbit mean-elements message in it (KVN, XML, JSON or CSV)"))
     return sets, problems
@@ -72,7 +87,12 @@ def _reader(text: str) -> Callable[[str], Iterator[_Record | _BadRecordError]]:
     if start[:1] in ("{", "["):
         return _read_json
     first_line = start.split("\n", 1)[0]
-    return _read_csv if "," in first_line and "=" not in first_line else _read_kvn
+    return _read_csv if _delimiter(first_line) and "=" not in first_line else _read_kvn
+
+
+def _delimiter(header: str) -> str:
+    """What stands between the columns of a CSV, empty where it is none."""
+    return next((one for one in (",", ";", "\t") if one in header), "")
 
 
 def _read_kvn(text: str) -> Iterator[_Record | _BadRecordError]:
@@ -80,9 +100,10 @@ def _read_kvn(text: str) -> Iterator[_Record | _BadRecordError]:
     begin = 0
     for number, raw in enumerate(text.split("\n"), start=1):
         line = raw.strip()
-        if not line or line.split()[0] == "COMMENT":
+        if not line or line.split()[0].upper() in _IGNORED_KVN:
             continue
         key, equals, value = (part.strip() for part in line.partition("="))
+        key = key.upper()
         if not equals or not key:
             yield _BadRecordError(f"{line[:40]!r} is not KEY = VALUE", number)
             continue
@@ -97,52 +118,96 @@ def _read_kvn(text: str) -> Iterator[_Record | _BadRecordError]:
 
 
 def _read_csv(text: str) -> Iterator[_Record | _BadRecordError]:
-    reader = csv.reader(text.strip("\n").split("\n"))
+    body = text.strip("\n")
+    reader = csv.reader(body.split("\n"), delimiter=_delimiter(body.lstrip().split("\n", 1)[0]), skipinitialspace=True)
     skipped = len(text) - len(text.lstrip("\n"))
     header: list[str] | None = None
     try:
         for row in reader:
             line = reader.line_num + skipped
             if header is None:
-                header = [key.strip() for key in row]
-            elif len(row) == len(header):
-                yield _Record(dict(zip(header, (value.strip() for value in row), strict=True)), line)
-            elif row:
+                header = [key.strip().upper() for key in row]
+            elif len(row) >= len(header) and not any(row[len(header) :]):
+                values = (value.strip() for value in row[: len(header)])
+                yield _Record(dict(zip(header, values, strict=True)), line)
+            elif any(row) and not row[0].startswith("#"):
                 yield _BadRecordError(f"{len(row)} values, the header names {len(header)}", line)
     except csv.Error as error:
         yield _BadRecordError(f"not CSV: {error}", reader.line_num + skipped)
 
 
 def _read_json(text: str) -> Iterator[_Record | _BadRecordError]:
+    """A list, an object, objects one after another, or what is whole of a list that was cut."""
+    number = 0
     try:
-        content = json.loads(text)
+        for content in _json_values(text):
+            for item in _json_records(content):
+                number += 1
+                if item is None:
+                    yield _BadRecordError("not an object with the fields of an OMM", record=number)
+                else:
+                    yield _Record(item, record=number)
     except json.JSONDecodeError as error:
         yield _BadRecordError(f"not JSON: {error.msg}", error.lineno)
-        return
     except (ValueError, RecursionError):
         yield _BadRecordError("not JSON: nested too deep, or a number too long")
+
+
+def _json_values(text: str) -> Iterator[Any]:
+    """The values of a text; of a list those within it, so that a cut one gives what is before the cut."""
+    decoder = json.JSONDecoder()
+    at = 0
+    while (found := _JSON_BETWEEN.match(text, at)) and found.end() < len(text):
+        value, at = decoder.raw_decode(text, found.end())
+        yield value
+
+
+def _json_records(content: Any) -> Iterator[dict[str, str] | None]:
+    """The objects that are OMMs, however deep; None for what is none."""
+    if isinstance(content, list):
+        for item in content:
+            yield from _json_records(item)
         return
-    for record, item in enumerate(content if isinstance(content, list) else [content], start=1):
-        if isinstance(item, dict):
-            values = {key: str(value) for key, value in item.items() if isinstance(value, str | int | float)}
-            yield _Record(values, record=record)
-        else:
-            yield _BadRecordError("not an object with the fields of an OMM", record=record)
+    leaves = _json_leaves(content) if isinstance(content, dict) else {}
+    if any(key in leaves for key in _OF_A_RECORD):
+        yield leaves
+        return
+    lists = [value for value in content.values() if isinstance(value, list)] if isinstance(content, dict) else []
+    if not lists:
+        yield None
+    for value in lists:
+        yield from _json_records(value)
+
+
+def _json_leaves(item: dict[str, Any]) -> dict[str, str]:
+    """The fields of an object and of those within it, as the XML form nests them."""
+    leaves: dict[str, str] = {}
+    for key, value in item.items():
+        if isinstance(value, dict):
+            leaves |= _json_leaves(value)
+        elif isinstance(value, str | int | float):
+            leaves[key.strip().upper()] = str(value).strip()
+    return leaves
 
 
 def _read_xml(text: str) -> Iterator[_Record | _BadRecordError]:
     if _FORBIDDEN_XML.search(text):
         yield _BadRecordError("a DOCTYPE or ENTITY declaration: an OMM has none, so the file is not read")
         return
-    try:
-        root = ElementTree.fromstring(text.strip())
-    except (ElementTree.ParseError, ValueError) as error:
-        yield _BadRecordError(f"not XML: {error}")
-        return
-    segments = [node for node in root.iter() if _tag(node) == "segment"]
-    for record, segment in enumerate(segments, start=1):
-        leaves = {_tag(node): (node.text or "").strip() for node in segment.iter() if len(node) == 0}
-        yield _Record(leaves, record=record)
+    record = 0
+    for part in re.split(r"(?=<\?xml\b)", text.strip()):
+        if not part.strip():
+            continue
+        try:
+            root = ElementTree.fromstring(part.strip())
+        except (ElementTree.ParseError, ValueError) as error:
+            yield _BadRecordError(f"not XML: {error}")
+            continue
+        found = [node for node in root.iter() if _tag(node) == "segment"]
+        for segment in found or [node for node in root.iter() if _tag(node) == "omm"]:
+            record += 1
+            leaves = {_tag(node).upper(): (node.text or "").strip() for node in segment.iter() if len(node) == 0}
+            yield _Record(leaves, record=record)
 
 
 def _tag(node: ElementTree.Element) -> str:
@@ -151,19 +216,19 @@ def _tag(node: ElementTree.Element) -> str:
 
 def _element_set(item: _Record, file: str) -> ElementSet:
     fields = item.fields
-    for key, allowed in _REQUIRED_WORDS.items():
+    for key, (allowed, said) in _REQUIRED_WORDS.items():
         value = fields.get(key, "")
-        if value and value.upper() not in allowed:
-            raise _BadRecordError(f"{key} is {value[:40]!r}; only {' or '.join(allowed)} can be used with SGP4")
+        if value and re.fullmatch(allowed, _plain(value)) is None:
+            raise _BadRecordError(f"{key} is {value[:40]!r}; only {said} can be used with SGP4")
     number_text = _text(fields, "NORAD_CAT_ID")
-    norad_id = catalogue_number(number_text)
+    norad_id = _catalogue_number(number_text)
     if norad_id is None:
         raise _BadRecordError(f"NORAD_CAT_ID is {number_text[:40]!r}, not a catalogue number")
     return ElementSet(
         kind="omm",
         name=fields.get("OBJECT_NAME", ""),
         norad_id=norad_id,
-        epoch_tai_s=_epoch_tai_s(_text(fields, "EPOCH")),
+        epoch_tai_s=_epoch_tai_s(_text(fields, "EPOCH"), fields.get("TIME_SYSTEM", "").upper() or "UTC"),
         mean_motion_rad_s=rad_s_from_rev_day(_number(fields, "MEAN_MOTION", 1e-6, 20.0)),
         eccentricity=_number(fields, "ECCENTRICITY", 0.0, 0.9999999),
         inclination_rad=_number(fields, "INCLINATION", 0.0, 180.0) * DEG,
@@ -184,18 +249,29 @@ def _text(fields: Mapping[str, str], key: str) -> str:
     return value
 
 
+def _plain(text: str) -> str:
+    return "".join(c for c in text.upper() if c not in " -_")
+
+
+def _catalogue_number(text: str) -> int | None:
+    """As in the file: digits, digits that became a fraction (25544.0), or Alpha-5."""
+    whole = _WHOLE.fullmatch(text.strip())
+    return catalogue_number(whole[1] if whole else text.strip().upper())
+
+
 def _number(fields: Mapping[str, str], key: str, low: float, high: float) -> float:
-    text = _text(fields, key)
-    if _NUMBER.fullmatch(text) is None or not isfinite(float(text)):
+    text = re.sub(r"\s*\[[^\]]*\]$", "", _text(fields, key))
+    plain = text.upper().replace("D", "E")  # as Fortran writes exponents
+    if _NUMBER.fullmatch(plain) is None or not isfinite(float(plain)):
         raise _BadRecordError(f"{key} is {text[:40]!r}, not a number")
-    value = float(text)
+    value = float(plain)
     if not low <= value <= high:
         raise _BadRecordError(f"{key} is {text[:40]}, outside {low:g}..{high:g}")
     return value
 
 
-def _epoch_tai_s(text: str) -> float:
+def _epoch_tai_s(text: str, system: str) -> float:
     try:
-        return tai_from_utc(text if text.endswith("Z") else f"{text}Z")
+        return tai_from_ccsds(text, system)
     except ValueError as error:
         raise _BadRecordError(f"EPOCH is {text[:40]!r}, not a UTC time: {error}") from None

@@ -25,6 +25,11 @@ _J2000_ORDINAL = date(2000, 1, 1).toordinal()
 _J2000_UNIX_S = 946728000  # 2000-01-01T12:00:00Z as POSIX time
 _J2000_JD = 2451545.0
 _UTC_TEXT = re.compile(r"(\d{4})-(\d\d)-(\d\d)T(\d\d):(\d\d):(\d\d)(\.\d{1,12})?Z", re.ASCII)
+_CCSDS_TEXT = re.compile(
+    r"(\d{4})-(?:(\d\d-\d\d)|(\d{3}))(?:T| +)(\d\d:\d\d)(?::(\d\d)(?:\.(\d*))?)?(?: ?(?:Z|UTC)|[+-]00:?00)?", re.ASCII
+)
+_UNIFORM_MINUS_TAI_S = {"TAI": 0.0, "TT": 32.184, "GPS": -19.0}
+TIME_SYSTEMS = ("UTC", *_UNIFORM_MINUS_TAI_S)
 _EXPECTED = "expected UTC as YYYY-MM-DDThh:mm:ss[.fff]Z"
 
 
@@ -64,6 +69,34 @@ def tai_from_utc(text: str) -> float:
         raise ValueError(f"{text!r}: that day had no leap second")
     whole_s = midnight_s + 3600 * hour + 60 * minute + second
     return whole_s + _tai_minus_utc_s(midnight_s) + fraction_s
+
+
+def tai_from_ccsds(text: str, system: str = "UTC") -> float:
+    """Read a time of a CCSDS message, of one of TIME_SYSTEMS, as people write it.
+
+    YYYY-MM-DDThh:mm:ss[.fff][Z] or YYYY-DDDThh:mm:ss[.fff][Z], a blank for the T, no seconds, small letters.
+    Raises:  ValueError: says what was expected.
+    """
+    match = _CCSDS_TEXT.fullmatch(text.strip().upper())
+    if match is None:
+        raise ValueError(f"{text[:40]!r}: expected a time as YYYY-MM-DDThh:mm:ss[.fff] or YYYY-DDDThh:mm:ss[.fff]")
+    day = f"{match[1]}-{match[2]}" if match[2] else _calendar(int(match[1]), int(match[3]))
+    tai_s = tai_from_utc(f"{day}T{match[4]}:{match[5] or '00'}.{(match[6] or '0')[:12]}Z")
+    if system == "UTC":
+        return tai_s
+    as_uniform_s = unix_from_tai(tai_s) - unix_from_tai(tai_from_utc("2000-01-01T12:00:00Z"))
+    return as_uniform_s - _UNIFORM_MINUS_TAI_S[system]
+
+
+def _calendar(year: int, day: int) -> str:
+    """The date of a day of the year.  ValueError: no such day."""
+    try:
+        found = date(year, 1, 1) + timedelta(days=day - 1)
+    except (ValueError, OverflowError):
+        raise ValueError("no such date") from None
+    if found.year != year:
+        raise ValueError(f"{year} has no day {day}")
+    return found.isoformat()
 
 
 def tai_from_unix(unix_s: float) -> float:
