@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from late_writes import late_deg
 from script_modules import load
 from supervisor import read_unit
 
@@ -162,10 +163,12 @@ class Crashes:
             seconds.append((first_s, float(stays[0] - killed_tai_s) if stays.size else float("inf")))
         return seconds
 
-    def error_when_back_deg(self) -> float:
-        trace = read_trace(rig_file(self.rig, "trace"))
-        back = int(np.flatnonzero(trace.tai_s >= self.rig.scene.start_tai_s + LOSS_S[1])[0])
-        return float(trace.error_deg[back])
+    def error_when_back_deg(self) -> tuple[float, float]:
+        """The beam error as the signal comes back, and what of it a late write may have cost."""
+        writes, trace = read_writes(rig_file(self.rig, "wire_log")), read_trace(rig_file(self.rig, "trace"))
+        back_tai_s = self.rig.scene.start_tai_s + LOSS_S[1]
+        back = int(np.flatnonzero(trace.tai_s >= back_tai_s)[0])
+        return float(trace.error_deg[back]), late_deg(writes, trace, back_tai_s, back_tai_s)
 
 
 def rig_file(rig: Any, name: str) -> Path:
@@ -206,7 +209,7 @@ def test_p4_a_daemon_killed_in_a_loss_is_back_on_the_path_at_once(
 ) -> None:
     crashed = crashes[link].result()
     seconds = crashed.seconds_to_writes()
-    error_deg = crashed.error_when_back_deg()
+    error_deg, late = crashed.error_when_back_deg()
     ahead = f"at niceness {NICENESS}, as the unit says" if crashed.is_ahead else "at niceness 0: more is not permitted"
     print(f"{link}, {ahead}: SIGKILL to correct register writes, s, asked {ASKED_S:g}:")
     for load_name in dict.fromkeys(LOADS):
@@ -216,7 +219,7 @@ def test_p4_a_daemon_killed_in_a_loss_is_back_on_the_path_at_once(
     for first_s, correct_s in seconds:
         assert correct_s < np.inf
         assert correct_s <= 2 * first_s + STANDSTILL_S
-    assert error_deg <= CORRECT_DEG
+    assert error_deg <= CORRECT_DEG + late
     assert crashed.errors == ""
 
 

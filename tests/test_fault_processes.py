@@ -2,8 +2,8 @@
 fault proxy, one on a pseudo terminal behind a by-id link.
 
 Asserts what happened and counts, never speed: the machine may be busy.  The satellite climbs at 0.2 deg/s meanwhile:
-0.1 deg asks for an orbit and a lag that are right, and for registers no older than half a second, not for an idle
-machine.  What stands for hardware, the simulated ACU and the proxy, runs before all others where that is permitted: a
+0.1 deg, and what the satellite goes on while a write is late, ask for an orbit and a lag that are right, not for an
+idle machine.  What stands for hardware, the simulated ACU and the proxy, runs before all others where that is permitted: a
 real ACU is not starved by the loads that starve the daemon.
 """
 
@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from late_writes import late_deg
 from script_modules import load
 
 from acu_daemon.model import sky_angle_deg
@@ -217,9 +218,12 @@ def test_p2_p3_the_antenna_is_held_after_faults_of_the_line_and_the_machine(
     That the satellite is tracked then, the story has waited for.
     """
     story = stories[link].result()
+    assert story.writes is not None
+    assert story.trace is not None
     beam_deg, registers_deg = worst_error_deg(story), worst_register_deg(story)
+    late = late_deg(story.writes, story.trace, story.marks_tai_s["held"], story.marks_tai_s["signal"])
     print(f"{link}: beam error when the signal is back {beam_deg:.3f} deg, of the registers {registers_deg:.3f} deg")
-    assert beam_deg <= ASKED_DEG
+    assert beam_deg <= ASKED_DEG + late
     assert registers_deg <= ASKED_DEG
 
 
