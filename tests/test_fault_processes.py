@@ -3,8 +3,8 @@ fault proxy, one on a pseudo terminal behind a by-id link.
 
 Asserts what happened and counts, never speed: the machine may be busy.  The satellite climbs at 0.2 deg/s meanwhile:
 0.1 deg, and what the satellite goes on while a write is late, ask for an orbit and a lag that are right, not for an
-idle machine.  What stands for hardware, the simulated ACU and the proxy, runs before all others where that is permitted: a
-real ACU is not starved by the loads that starve the daemon.
+idle machine.  What stands for hardware, the simulated ACU and the proxy, runs before all others where that is
+permitted: a real ACU is not starved by the loads that starve the daemon.
 """
 
 import os

@@ -1,9 +1,12 @@
 """The links over a real TCP socket and a real pseudo terminal pair; no timing is asserted."""
 
 import asyncio
+import contextlib
 import errno
+import fcntl
 import os
 import socket
+import sys
 import termios
 import threading
 import tty
@@ -189,6 +192,81 @@ async def test_drained_input_is_never_read() -> None:
         await link.close()
 
 
+class DeafAcu:
+    """A listener whose client's bytes nobody reads until the test does; so much fits into no buffer on the way."""
+
+    LOTS = bytes(range(256)) * 40_000
+
+    def __init__(self) -> None:
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.link = make_link(f"tcp://127.0.0.1:{self._listener.getsockname()[1]}")
+
+    async def open(self) -> socket.socket:
+        await self.link.open()
+        client, _ = self._listener.accept()
+        client.settimeout(10.0)
+        return client
+
+    @staticmethod
+    def waiting_count(client: socket.socket) -> int:
+        """Bytes that have arrived and wait to be read."""
+        return int.from_bytes(fcntl.ioctl(client, termios.FIONREAD, bytes(4)), sys.byteorder)
+
+    @staticmethod
+    def read_to_the_end(client: socket.socket) -> tuple[int, bool]:
+        """How much comes, and whether the end is a reset."""
+        count = 0
+        with client:
+            while True:
+                try:
+                    data = client.recv(1_000_000)
+                except ConnectionResetError:
+                    return count, True
+                if not data:
+                    return count, False
+                count += len(data)
+
+    def close(self) -> None:
+        self._listener.close()
+
+
+@pytest.mark.parametrize("answered_count", [0, 1, 2])
+async def test_what_was_not_sent_before_a_close_never_arrives_over_tcp(answered_count: int) -> None:
+    acu = DeafAcu()
+    client = await acu.open()
+    for _ in range(answered_count):
+        acu.link.write(b"poll")
+        client.sendall(b"answer")
+        await read_bytes(acu.link, 6)
+        assert client.recv(4) == b"poll"
+    acu.link.write(acu.LOTS)
+    await acu.link.close()
+    arrived_count = acu.waiting_count(client)
+    assert arrived_count < len(acu.LOTS)
+    count, is_reset = acu.read_to_the_end(client)
+    assert count <= arrived_count
+    assert is_reset
+    again = await acu.open()
+    acu.link.write(b"new")
+    assert again.recv(100) == b"new"
+    await acu.link.close()
+    again.close()
+    acu.close()
+
+
+@pytest.mark.parametrize("write_count", [0, 1, 3])
+async def test_a_close_after_the_last_answer_is_an_orderly_end(write_count: int) -> None:
+    acu = DeafAcu()
+    client = await acu.open()
+    for _ in range(write_count):
+        acu.link.write(b"stop")
+        client.sendall(b"done")
+        await read_bytes(acu.link, 4)
+    await acu.link.close()
+    assert acu.read_to_the_end(client) == (4 * write_count, False)
+    acu.close()
+
+
 class Pty:
     """A pseudo terminal pair; the test holds the master."""
 
@@ -241,6 +319,46 @@ async def test_a_write_larger_than_the_port_takes_goes_out_in_pieces(pty: Pty) -
         except BlockingIOError:
             await asyncio.sleep(0)
     await link.close()
+
+
+def drained(master: int) -> bytes:
+    """All that has come out of the line by now."""
+    os.set_blocking(master, False)
+    data = b""
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            data += os.read(master, 65536)
+    return data
+
+
+async def test_what_a_serial_port_did_not_take_before_a_close_never_goes_out(pty: Pty) -> None:
+    link = make_link(f"serial://{pty.path}")
+    for _ in range(2):
+        await link.open()
+        link.write(bytes(200_000))
+        await link.close()
+        assert len(drained(pty.master)) < 200_000
+        await link.open()
+        await asyncio.sleep(0)
+        link.write(b"new")
+        assert drained(pty.master) == b"new"
+        await link.close()
+
+
+async def test_what_a_serial_port_took_but_has_not_sent_is_thrown_away_before_it_is_closed(
+    pty: Pty, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A pseudo terminal sends at once; a port at 9600 baud still holds a command for 20 ms."""
+    done: list[str] = []
+    discard, close = serial.Serial.reset_output_buffer, serial.Serial.close
+    monkeypatch.setattr(serial.Serial, "reset_output_buffer", lambda port: (done.append("discard"), discard(port)))
+    monkeypatch.setattr(serial.Serial, "close", lambda port: (done.append("close"), close(port)))
+    link = make_link(f"serial://{pty.path}")
+    await link.open()
+    link.write(b"x")
+    done.clear()
+    await link.close()
+    assert done[:2] == ["discard", "close"]
 
 
 async def test_a_serial_line_that_hangs_up_is_a_link_error(pty: Pty) -> None:
