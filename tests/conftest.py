@@ -1,15 +1,22 @@
 """What every test shares: where the real data lies, and the rule that no task may leak."""
 
 import asyncio
+import os
 from collections.abc import AsyncIterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 import pytest_asyncio
 from hypothesis import settings
+from xdist.scheduler import LoadScopeScheduling
 
-SHARED = Path(__file__).resolve().parents[2] / "shared"
+PROJECT = Path(__file__).resolve().parents[1]
+SHARED = PROJECT.parent / "shared"
 DATA = SHARED / "data"
+
+os.umask(0o022)  # whatever the caller's is: it decides who may write the files of the tests
+os.environ.setdefault("MPLCONFIGDIR", str(PROJECT / ".pytest_cache" / "matplotlib"))  # no cache in anybody's home
 
 # The same examples in every run, no matter how busy the machine: a test fails for the code's sake or not at all.
 # New examples, kept in .hypothesis where one fails: pytest --hypothesis-profile=explore
@@ -18,6 +25,21 @@ settings.register_profile("explore", deadline=None, print_blob=True)
 settings.load_profile("same")
 
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="the real data folder ../shared/data is not there")
+
+STORIES = ("bench_pass", "crash", "disk_processes", "fault_processes", "install", "log_processes")
+
+
+class WithStories(LoadScopeScheduling):
+    """Deals out tests one by one, but all that ask about one story of real processes to the same worker."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        name = Path(nodeid.split("::")[0]).stem.removeprefix("test_")
+        return name if name in STORIES else nodeid
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling | None:
+    """Take that one for `pytest --dist loadscope`."""
+    return WithStories(config, log) if config.getvalue("dist") == "loadscope" else None
 
 
 @pytest_asyncio.fixture

@@ -5,6 +5,7 @@ permitted, and loads bytecode, as where it is installed.  The figures are printe
 machine's speed changes: the way back takes no longer than the daemon was away.
 """
 
+import itertools
 import json
 import os
 import signal
@@ -29,7 +30,7 @@ from acu_daemon.report.trace import read_trace
 from acu_daemon.report.wire import HALF_SERVO_TICK_S, read_writes, satellite_at
 
 pass_rig, process_load = load("pass_rig"), load("process_load")
-pytestmark = [pytest.mark.realtime, pytest.mark.xdist_group("crash")]
+pytestmark = pytest.mark.realtime
 
 LOSS_S = (30.0, 92.0)  # from the scene's start
 FIRST_KILL_S, APART_S = {"tcp": 34.0, "pty": 41.0}, 14.0
@@ -230,10 +231,15 @@ def test_p4_it_goes_back_to_its_state_and_to_its_fit(crashes: dict[str, "Future[
     for log in others:
         (resumed,) = [entry for entry in log if entry["event"] == "run.resumed"]
         assert resumed["state"] == "HOLD/FITTED"
-        states = [entry["state"] for entry in log if entry["event"] == "state.changed"]
-        assert states[:2] == ["IDLE", "HOLD/FITTED"]
+        assert states_of(log)[:2] == ["IDLE", "HOLD/FITTED"]
         assert not {"fit.first", "fit.note", "run_state.unreadable"} & {entry["event"] for entry in log}
-    assert [entry["state"] for entry in others[-1] if entry["event"] == "state.changed"][2] == "AUTOTRACK/FITTED"
+    assert states_of(others[-1])[2] == "AUTOTRACK/FITTED"
+
+
+def states_of(log: list[dict[str, Any]]) -> list[str]:
+    """What a daemon went through; on a machine that stood still it may have lost the link for a moment as well."""
+    states = [entry["state"] for entry in log if entry["event"] == "state.changed" and entry["state"] != "LINK-LOST"]
+    return [state for state, _ in itertools.groupby(states)]
 
 
 @pytest.mark.parametrize("link", ["tcp", "pty"])

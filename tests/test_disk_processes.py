@@ -27,7 +27,7 @@ from acu_daemon.edge.recording import read_readings
 from acu_daemon.edge.run_state import RUN_STATE, read_run_state
 
 pass_rig = load("pass_rig")
-pytestmark = [pytest.mark.realtime, pytest.mark.xdist_group("disk_processes")]
+pytestmark = pytest.mark.realtime
 
 DISK_BYTES = 256 * 1024
 CARRY_OVER = "carry-over-99901.json"

@@ -16,7 +16,7 @@ import pytest
 
 from acu_daemon import __version__
 
-pytestmark = [pytest.mark.realtime, pytest.mark.xdist_group("install")]
+pytestmark = pytest.mark.realtime
 
 PROJECT = Path(__file__).resolve().parents[1]
 PATIENCE_S = 240.0

@@ -21,7 +21,7 @@ from acu_daemon.edge.run_state import RUN_STATE
 from acu_daemon.report.trace import read_trace
 
 pass_rig = load("pass_rig")
-pytestmark = [pytest.mark.realtime, pytest.mark.xdist_group("log_processes")]
+pytestmark = pytest.mark.realtime
 
 STOP_S = 10.0  # as the unit's TimeoutStopSec
 LINES_UNREAD_S = 6.0
