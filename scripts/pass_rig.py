@@ -18,6 +18,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from process_load import try_nice
 from real_pass import pass_names, truth_path, truth_span, write_config
 
 from acu_daemon.cli.options import coming_pass, load_target
@@ -34,6 +35,7 @@ LEAD_S = 4.0  # both processes need this long to start
 STARTS = 4.0  # and on a busy machine this many times what one start takes
 BEFORE_RISE_S = 30.0  # a whole pass begins this long before the rise
 SAY_EVERY_S = 5.0
+DAEMON_NICENESS = -10  # as its unit says
 HARDWARE_NICENESS = -10  # of what stands for hardware, where permitted: a real ACU does not share the host's processor
 
 SCENARIO = """\
@@ -131,6 +133,7 @@ class Rig:
     acu: "subprocess.Popen[str] | None" = None
     daemon: "subprocess.Popen[str] | None" = None
     url: str = ""
+    is_ahead: bool = False  # the daemon has its unit's niceness
     config: Path = field(init=False)
 
     def __post_init__(self) -> None:
@@ -184,10 +187,14 @@ class Rig:
         station.write_text(station.read_text().replace("tcp://127.0.0.1:3842", self.url))
 
     def start_daemon(self, *more: str) -> None:
-        """Start the daemon: its log goes to `log`, its complaints to `errors`."""
+        """Start the daemon, as far ahead of others as its unit puts it where that is permitted.
+
+        Its log goes to `log`, its complaints to `errors`.
+        """
         arguments = [*self.arguments("run"), "--state", str(self.directory / "state"), *more]
         with self.log.open("w") as log, self.errors.open("w") as errors:
-            self.daemon = subprocess.Popen(arguments, stdout=log, stderr=errors, text=True)
+            self.daemon = subprocess.Popen(arguments, stdout=log, stderr=errors, text=True, start_new_session=True)
+        self.is_ahead = try_nice(self.daemon.pid, DAEMON_NICENESS)
 
     def events(self, name: str) -> list[dict[str, Any]]:
         """Lines of the daemon's log about one event."""

@@ -9,7 +9,6 @@ import itertools
 import json
 import os
 import signal
-import subprocess
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -22,7 +21,6 @@ import numpy as np
 import pytest
 from late_writes import late_deg
 from script_modules import load
-from supervisor import read_unit
 
 from acu_daemon.model import sky_angle_deg
 from acu_daemon.orbit.timescales import utc_text
@@ -37,7 +35,6 @@ FIRST_KILL_S, APART_S = {"tcp": 34.0, "pty": 41.0}, 14.0
 LOADS = ("quiet", "quiet", "busy", "busy")  # of the machine, at each kill
 BUSY_S = (61.0, 88.0)
 RESTART_S = 0.1  # as the unit's RestartSec
-NICENESS = int(read_unit()["Nice"][-1])
 CORRECT_DEG = 0.1
 STAYS_S = 2.0  # a machine that stands still for a second later on is no part of the restart
 ASKED_S = 3.0
@@ -75,12 +72,8 @@ class Crashes:
         time.sleep(max(0.0, self.rig.scene.start_tai_s + since_start_s - self.tai_s))
 
     def start_daemon(self) -> None:
-        """As its unit does."""
-        rig = self.rig
-        arguments = [*rig.arguments("run"), "--state", str(rig.directory / "state")]
-        with rig.log.open("w") as log, rig.errors.open("w") as errors:
-            rig.daemon = subprocess.Popen(arguments, stdout=log, stderr=errors, text=True, start_new_session=True)
-        self.is_ahead &= process_load.try_nice(rig.daemon.pid, NICENESS)
+        self.rig.start_daemon()
+        self.is_ahead &= self.rig.is_ahead
 
     def crash(self) -> None:
         """SIGKILL, and what systemd does then."""
@@ -211,7 +204,11 @@ def test_p4_a_daemon_killed_in_a_loss_is_back_on_the_path_at_once(
     crashed = crashes[link].result()
     seconds = crashed.seconds_to_writes()
     error_deg, late = crashed.error_when_back_deg()
-    ahead = f"at niceness {NICENESS}, as the unit says" if crashed.is_ahead else "at niceness 0: more is not permitted"
+    ahead = (
+        f"at niceness {pass_rig.DAEMON_NICENESS}, as the unit says"
+        if crashed.is_ahead
+        else "at niceness 0: more is not permitted"
+    )
     print(f"{link}, {ahead}: SIGKILL to correct register writes, s, asked {ASKED_S:g}:")
     for load_name in dict.fromkeys(LOADS):
         those = [one for (_, one), at in zip(seconds, LOADS, strict=True) if at == load_name]

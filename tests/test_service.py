@@ -90,6 +90,10 @@ def test_the_unit_is_exposed_by_no_more_than_1_5(unit: Path) -> None:
     assert done.returncode == 0, done.stdout
 
 
+def test_the_rigs_of_other_tests_and_benches_run_the_daemon_as_far_ahead_as_the_unit() -> None:
+    assert read_unit()["Nice"] == [str(pass_rig.DAEMON_NICENESS)]
+
+
 def test_the_unit_restarts_for_ever_but_not_after_a_refused_configuration() -> None:
     directives = read_unit()
     assert directives["Restart"] == ["always"]
