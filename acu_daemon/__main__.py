@@ -19,6 +19,11 @@ def main() -> None:
         command_line()
     except KeyboardInterrupt:
         sys.exit(130)
+    except (ImportError, MemoryError, OSError) as error:  # while it is loaded; the command line tells all else itself
+        from acu_daemon.edge.denied import denied
+
+        print(f"acu-daemon: the system denies what this needs: {denied(error)}", file=sys.stderr)  # noqa: T201
+        sys.exit(2)
 
 
 def keep_out_the_working_directory() -> None:

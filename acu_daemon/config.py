@@ -3,6 +3,8 @@
 Unknown keys, wrong units and impossible values stop the start with file, key, value and what was expected.
 """
 
+import errno
+import os
 import tomllib
 from pathlib import Path
 from typing import Any, TypeVar, get_args
@@ -29,14 +31,21 @@ def load_station(directory: Path) -> StationFile:
 
 
 def satellite_names(directory: Path) -> list[str]:
-    """Names of the satellites' files, sorted."""
-    return sorted(path.stem for path in (directory / "satellites").glob("[!.]*.toml"))
+    """Names of the satellites' files, sorted.  ConfigError: the directory cannot be looked into."""
+    satellites = directory / "satellites"
+    try:
+        names = os.listdir(satellites)  # noqa: PTH208  Path.glob finds nothing where it may not look
+    except (FileNotFoundError, NotADirectoryError):
+        return []
+    except OSError as error:
+        raise ConfigError(f"{satellites}: cannot be read: {error.strerror}") from None
+    return sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml") and not name.startswith("."))
 
 
 def load_satellite(directory: Path, name: str, station: StationFile) -> tuple[SatelliteFile, StationFile]:
     """Read DIR/satellites/NAME.toml; also the station with that file's overrides applied."""
     path = directory / "satellites" / f"{name}.toml"
-    if not path.exists():
+    if not _exists(path):
         known = ", ".join(satellite_names(directory)) or "none"
         raise ConfigError(f"{path}: no such file; satellites in {directory}: {known}")
     satellite = _parse(SatelliteFile, path, _read(path))
@@ -49,6 +58,14 @@ def load_satellite(directory: Path, name: str, station: StationFile) -> tuple[Sa
         override: dict[str, Any] = getattr(satellite, key)
         sections[key] = _parse(type(section), path, section.model_dump() | override, under=key)
     return satellite, station.model_copy(update=sections)
+
+
+def _exists(path: Path) -> bool:
+    """Whether there is such a file; one that may not be looked at is there, and whoever reads it says why it cannot."""
+    try:
+        return path.exists()
+    except OSError as error:
+        return error.errno != errno.ENAMETOOLONG
 
 
 def _read(path: Path) -> dict[str, Any]:

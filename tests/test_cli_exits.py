@@ -34,7 +34,7 @@ def test_every_kind_of_failure_has_its_exit_status(
     def fail(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr(passes, "load_target", fail)
+    monkeypatch.setattr(passes, "load_station", fail)
     done = acu_daemon("passes", "--config", write(tmp_path), "--satellite", "scd")
     assert done.code == code
     assert "Traceback" not in done.err

@@ -9,7 +9,7 @@ import traceback
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Annotated
+from typing import Annotated, TextIO
 
 import typer
 
@@ -168,22 +168,22 @@ def _last_word(error: BaseException) -> int:
         case AcuDaemonError():
             return _complain(str(error), EXIT_FAILED)
         case BrokenPipeError():  # whoever read our output has gone, such as `| head`
-            _forget_output()
+            _forget(sys.stdout, 1)
             return EXIT_FAILED
     if words := denied(error):
-        where = "standard output: " if _forget_output() else ""
+        where = "standard output: " if _forget(sys.stdout, 1) else ""
         return _complain(f"the system denies what this needs: {where}{words}", EXIT_USAGE)
     traceback.print_exception(error)
     return _complain("internal error; please report the lines above", EXIT_INTERNAL)
 
 
-def _forget_output() -> bool:
-    """Whether output could not be written; it is not tried again at the end."""
+def _forget(stream: TextIO, descriptor: int) -> bool:
+    """Whether a stream cannot be written; then what it still holds is not tried again at the end."""
     try:
-        sys.stdout.flush()
+        stream.flush()
     except OSError:
         with contextlib.suppress(OSError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+            os.dup2(os.open(os.devnull, os.O_WRONLY), descriptor)
         return True
     return False
 
@@ -192,4 +192,5 @@ def _complain(text: str, status: int) -> int:
     with contextlib.suppress(OSError):  # standard error may be full or gone
         for line in text.splitlines():
             print(f"acu-daemon: {line}", file=sys.stderr)  # noqa: T201
+    _forget(sys.stderr, 2)
     return status

@@ -63,8 +63,12 @@ def command(
     names: list[str | None] = [*ESTIMATORS] if estimator == ALL else [estimator]
     paths = {name: _beside(out, name) if estimator == ALL else out for name in names}
     for path in paths.values():
-        _refuse_unwritable(path)
-        if path.exists() and readings.exists() and path.samefile(readings):
+        try:
+            _refuse_unwritable(path)
+            is_same = path.exists() and readings.exists() and path.samefile(readings)
+        except OSError as error:
+            raise UsageError(f"{error.filename}: {error.strerror}") from None
+        if is_same:
             raise UsageError(f"--out {path} is the recording itself; give the predictions a file of their own")
     lines = read_readings(readings, lambda said: typer.echo(f"warning: {said}", err=True))
     if not lines:

@@ -44,7 +44,7 @@ from acu_daemon.edge.control_socket import ControlSocket
 from acu_daemon.edge.denied import denied
 from acu_daemon.edge.fit import ProcessFitRunner
 from acu_daemon.edge.link import Link, check_rate, make_link
-from acu_daemon.edge.logs import configure_logs, tell_dropped, tell_signal
+from acu_daemon.edge.logs import configure_logs, tell_dropped, tell_loop_problem, tell_signal
 from acu_daemon.edge.recording import RecordingWriter
 from acu_daemon.edge.scheduling import keep_to_this_thread, scheduling_text
 from acu_daemon.edge.signals import STOPS, take_signals
@@ -254,7 +254,9 @@ async def _run(
         on_end=lambda: notifier("STOPPING=1"),  # no tick feeds the watchdog from here on: it lets the daemon stop
         files_alarm=files_alarm,
     )
-    ignored = take_signals(asyncio.get_running_loop(), service.stop, tell_signal)
+    loop = asyncio.get_running_loop()
+    loop.set_exception_handler(tell_loop_problem)
+    ignored = take_signals(loop, service.stop, tell_signal)
     if ignored:
         reason = "whoever started this daemon ignores them, as nohup does"
         structlog.get_logger("run").info("signals.ignored", signals=ignored, reason=reason)

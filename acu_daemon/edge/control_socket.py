@@ -16,6 +16,7 @@ from typing import Any
 
 import structlog
 
+from acu_daemon.edge.denied import denied
 from acu_daemon.errors import AcuDaemonError, UsageError
 
 SOCKET = "control.sock"
@@ -160,7 +161,7 @@ def _lock(directory: Path) -> int:
         descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     except OSError as error:
         if error.errno in SYSTEM_FAILS:
-            raise
+            raise UsageError(denied(error)) from None
         raise UsageError(f"{directory}: {error.strerror}; choose another place with --state DIR") from None
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

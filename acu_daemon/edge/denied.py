@@ -21,7 +21,8 @@ def denied(error: BaseException) -> str:
     if isinstance(error, RuntimeError) and str(error) == _NO_THREAD:
         return f"a thread: {_ADVICE[errno.EAGAIN]}"
     if isinstance(error, ImportError):
-        return f"a part of the program cannot be loaded ({error}): install it again, or allow more memory (ulimit -v)"
+        why = error.__cause__ or error  # numpy wraps it in a page of advice
+        return f"a part of the program cannot be loaded ({why}): install it again, or allow more memory (ulimit -v)"
     if not isinstance(error, OSError):
         return ""
     reason = _ADVICE.get(error.errno or 0) or error.strerror or str(error)

@@ -1,5 +1,6 @@
 """structlog: JSON lines to standard output for a service, readable lines for a terminal.  Changes, not ticks."""
 
+import asyncio
 import logging
 import sys
 from collections.abc import Callable, MutableMapping
@@ -8,6 +9,7 @@ from typing import Any
 
 import structlog
 
+from acu_daemon.edge.denied import denied
 from acu_daemon.edge.writer import Writer, write_text
 from acu_daemon.orbit.timescales import utc_text
 
@@ -56,6 +58,15 @@ def tell_signal(name: str) -> None:
     """Say that a signal came which means nothing here."""
     log: Any = structlog.get_logger("run")
     log.warning("signal.ignored", signal=name, advice="`acu-daemon status` asks, `disarm` and SIGTERM stop")
+
+
+def tell_loop_problem(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """Say what a callback of the loop could not do; with all we know where it is an error of ours."""
+    error = context.get("exception")
+    if words := denied(error) if error is not None else "":
+        structlog.get_logger("run").error("system.denied", what=context["message"], reason=words)
+    else:
+        loop.default_exception_handler(context)
 
 
 class _Output:

@@ -3,8 +3,10 @@
 import asyncio
 import contextlib
 import errno
+import fcntl
 import math
 import os
+import select
 import termios
 from collections.abc import Callable
 from pathlib import Path
@@ -20,7 +22,10 @@ CHARACTER_FORMATS = {"8N1": (serial.EIGHTBITS, serial.PARITY_NONE), "7E1": (seri
 
 
 class SerialLink:
-    """A serial port, held exclusively; can be opened again after close()."""
+    """A serial port, held exclusively; can be opened again after close().
+
+    The lock keeps those out who ask for it, TIOCEXCL (tty_ioctl(4)) whoever opens the port from then on, but for root.
+    """
 
     def __init__(self, path: str, baud: int, character_format: str, monotonic: Callable[[], float]) -> None:
         self._path, self._baud, self._format = path, baud, character_format
@@ -30,6 +35,7 @@ class SerialLink:
         self._port: serial.Serial | None = None
         self._arrivals = Arrivals()
         self._unsent = b""
+        self._is_drained = False  # in this turn of the loop: what it was woken for may be gone
 
     async def open(self) -> None:
         """Open the port exclusively.  LinkRefusedError: another program holds it; LinkError: there is no such port."""
@@ -49,6 +55,7 @@ class SerialLink:
             with contextlib.suppress(OSError, ValueError, NotImplementedError):
                 port.set_low_latency_mode(True)  # an FTDI adapter otherwise adds 16 ms to every reply
             os.set_blocking(port.fileno(), False)
+            fcntl.ioctl(port.fileno(), termios.TIOCEXCL)
             port.reset_input_buffer()
         except BaseException:
             port.close()
@@ -57,7 +64,7 @@ class SerialLink:
 
     def _open_error(self, error: OSError) -> LinkError:
         if error.errno in (errno.EAGAIN, errno.EBUSY):
-            return LinkRefusedError(f"{self._path} is held by another program; stop it first")
+            return LinkRefusedError(f"{self._path} is held by another program{self._who()}; stop it first")
         hint = {
             errno.ENOENT: "no such device; is the adapter plugged in?",
             errno.EACCES: "no permission; the user must be in the device's group, usually dialout",
@@ -101,7 +108,13 @@ class SerialLink:
         data = self._arrivals.take_all()
         with contextlib.suppress(OSError, termios.error):
             port.reset_input_buffer()
+        if not self._is_drained:
+            self._is_drained = True
+            asyncio.get_running_loop().call_soon(self._end_drain)
         return data
+
+    def _end_drain(self) -> None:
+        self._is_drained = False
 
     async def close(self) -> None:
         """Close at once; what has not gone out never does."""
@@ -113,6 +126,8 @@ class SerialLink:
         loop.remove_writer(port.fileno())
         with contextlib.suppress(OSError, termios.error):
             port.reset_output_buffer()
+        with contextlib.suppress(OSError, termios.error):
+            fcntl.ioctl(port.fileno(), termios.TIOCNXCL)  # it would outlive us while anybody else has the port open
         with contextlib.suppress(OSError, termios.error):
             port.close()
 
@@ -127,13 +142,23 @@ class SerialLink:
             return
         if data:
             self._arrivals.put(data, self._monotonic())
-        else:
+        elif _is_hung_up(port.fileno()):
             self._hang_up(None)
+        elif not self._is_drained:
+            self._end(LinkRefusedError(f"{self._path}: another program reads this line{self._who()}; stop it first"))
 
     def _hang_up(self, error: OSError | None) -> None:
-        asyncio.get_running_loop().remove_reader(self._opened().fileno())
         reason = f" ({error.strerror})" if error else ""
-        self._arrivals.fail(LinkError(f"{self._path} hung up{reason}: is the adapter still plugged in?"))
+        self._end(LinkError(f"{self._path} hung up{reason}: is the adapter still plugged in?"))
+
+    def _end(self, error: LinkError) -> None:
+        asyncio.get_running_loop().remove_reader(self._opened().fileno())
+        self._arrivals.fail(error)
+
+    def _who(self) -> str:
+        """Which other processes have the port open, as far as this user may know."""
+        named = ", ".join(f"{name}, process {pid}" for pid, name in others_with(Path(self._path)))
+        return f" ({named})" if named else ""
 
     def _opened(self) -> serial.Serial:
         if self._port is None:
@@ -143,3 +168,20 @@ class SerialLink:
 
 def _is_pseudo_terminal(path: str) -> bool:
     return Path(path).resolve().is_relative_to(PSEUDO_TERMINALS)
+
+
+def _is_hung_up(descriptor: int) -> bool:
+    poll = select.poll()
+    poll.register(descriptor, select.POLLIN)
+    return any(events & (select.POLLHUP | select.POLLERR | select.POLLNVAL) for _, events in poll.poll(0))
+
+
+def others_with(path: Path) -> list[tuple[int, str]]:
+    """Number and name of the other processes that have a file open, of those that this user may look into: proc(5)."""
+    real, found = os.path.realpath(path), []
+    for process in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError), os.scandir(process / "fd") as files:  # another user's, or ended meanwhile
+            is_open = any(os.readlink(one) == real for one in files)  # noqa: PTH115  a link such as pipe:[1] is no path
+            if is_open and int(process.name) != os.getpid():
+                found.append((int(process.name), (process / "comm").read_text(errors="replace").strip()))
+    return found

@@ -27,7 +27,10 @@ def state_directory(asked: Path | None, *, is_rehearsal: bool) -> Path:
 
 def state_path(asked: Path | None, *, is_rehearsal: bool) -> Path:
     """Where the directory is, made or not."""
-    real = (asked or _default()).resolve()  # so that "." has a name
+    try:
+        real = (asked or _default()).resolve()  # so that "." has a name
+    except (OSError, RuntimeError) as error:  # a directory that was removed, or links that go round
+        raise UsageError(f"state directory {asked}: {error}; choose another with --state DIR") from None
     return real.parent / f"{real.name}-rehearsal" if is_rehearsal else real
 
 

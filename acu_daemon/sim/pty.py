@@ -2,8 +2,10 @@
 
 import asyncio
 import contextlib
+import fcntl
 import os
 import socket
+import termios
 import tty
 from collections.abc import AsyncIterator, Iterator
 from hashlib import sha256
@@ -15,6 +17,8 @@ from acu_daemon.sim.fault_verbs import Fault, VerbName
 from acu_daemon.sim.server import MakePeer, Peer
 
 READ_BYTES = 4096
+FREE_S = 0.5  # how soon a port that a killed client held for itself can be opened again
+_TIOCGEXCL = 0x80045440  # tty_ioctl(4); not in termios
 PTY_FAULTS: frozenset[VerbName] = frozenset({"cut", "deaf", "reset", "unplug"})
 
 
@@ -55,6 +59,7 @@ class _Jack:
         self._master = self._slave = -1
         self._device = ""
         self._peer: Peer | None = None
+        self._freeing: asyncio.TimerHandle | None = None
 
     @property
     def path(self) -> Path:
@@ -76,6 +81,19 @@ class _Jack:
             raise UsageError(f"--pty {self._link} cannot be made: {error.strerror}") from None
         self._peer = self._make_peer(self._send, self._replug)
         self._listen()
+        self._free()
+
+    def _free(self) -> None:
+        """Let others in once a client that kept them out (TIOCEXCL) has died: an adapter does so at its last close.
+
+        Both of its locks are taken together, so that one without the other is a dead client's.
+        """
+        self._freeing = self._loop.call_later(FREE_S, self._free)
+        if int.from_bytes(fcntl.ioctl(self._slave, _TIOCGEXCL, bytes(4)), "little"):
+            with contextlib.suppress(BlockingIOError):
+                fcntl.flock(self._slave, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.ioctl(self._slave, termios.TIOCNXCL)
+                fcntl.flock(self._slave, fcntl.LOCK_UN)
 
     def _open(self) -> None:
         """Open a terminal whose name is not that of the last one: an adapter comes back under another name."""
@@ -92,6 +110,8 @@ class _Jack:
         if self._master < 0:
             return
         self._loop.remove_reader(self._master)
+        if self._freeing is not None:
+            self._freeing.cancel()
         if self._peer is not None:
             self._peer.close()
         self._link.unlink(missing_ok=True)
