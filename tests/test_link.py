@@ -6,6 +6,7 @@ import errno
 import fcntl
 import os
 import socket
+import subprocess
 import sys
 import termios
 import threading
@@ -16,11 +17,14 @@ from typing import Any
 
 import pytest
 import serial
+from unprivileged import as_nobody
 
 from acu_daemon.edge.arrivals import MAX_WAITING_BYTES, Arrivals
-from acu_daemon.edge.link import check_rate, make_link
+from acu_daemon.edge.link import check_rate, make_link, open_once
 from acu_daemon.edge.serial_port import SerialLink
 from acu_daemon.errors import LinkError, LinkRefusedError, UsageError
+from acu_daemon.sim.fault_board import FaultBoard
+from acu_daemon.sim.pty import serve_pty
 
 Handler = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
 
@@ -139,6 +143,85 @@ async def test_a_link_is_opened_again_while_the_name_server_hangs(monkeypatch: p
     server.may_answer.set()
     listener.close()
     await listener.wait_closed()
+
+
+def no_thread(_: threading.Thread) -> None:
+    raise RuntimeError("can't start new thread")
+
+
+@pytest.mark.parametrize(("host", "bracketed"), [("127.0.0.1", "127.0.0.1"), ("::1", "[::1]")])
+async def test_an_address_needs_no_thread_and_no_name_server(
+    host: str, bracketed: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    try:
+        server = await asyncio.start_server(lambda _, writer: writer.close(), host, 0)
+    except OSError:
+        pytest.skip(f"{host} is no address of this machine")
+    async with server:
+        link = make_link(f"tcp://{bracketed}:{server.sockets[0].getsockname()[1]}")
+        monkeypatch.setattr(threading.Thread, "start", no_thread)
+        await link.open()
+        await link.close()
+
+
+async def test_a_thread_that_cannot_be_made_is_a_failed_attempt_and_known_addresses_do_without(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async with await asyncio.start_server(lambda _, writer: writer.close(), "127.0.0.1", 0) as server:
+        link = make_link(f"tcp://localhost:{server.sockets[0].getsockname()[1]}")
+        with monkeypatch.context() as denied:
+            denied.setattr(threading.Thread, "start", no_thread)
+            with pytest.raises(LinkError, match="'localhost' cannot be looked up: can't start new thread"):
+                await link.open()
+        await link.open()
+        await link.close()
+        monkeypatch.setattr(threading.Thread, "start", no_thread)
+        await link.open()
+        await link.close()
+
+
+@pytest.fixture
+def many_addresses(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """A name with three addresses, of which one is dead, one has nobody listening and one the ACU; those tried."""
+    addresses, tried = ["192.0.2.1", "127.0.0.2", "127.0.0.1"], []
+    monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: [(0, 0, 0, "", (one, 0)) for one in addresses])
+    create = asyncio.BaseEventLoop.create_connection
+
+    async def create_connection(loop: Any, make: Any, host: str, port: int) -> Any:
+        tried.append(host)
+        if host == "192.0.2.1":  # for documentation, RFC 5737
+            await asyncio.Event().wait()
+        if host == "127.0.0.2":
+            raise ConnectionRefusedError(errno.ECONNREFUSED, "Connection refused")
+        return await create(loop, make, host, port)
+
+    monkeypatch.setattr(asyncio.BaseEventLoop, "create_connection", create_connection)
+    monkeypatch.setattr("acu_daemon.edge.tcp.CONNECT_TIMEOUT_S", 0.05)
+    return tried
+
+
+async def test_each_address_of_a_name_has_its_own_time_and_the_one_that_answered_comes_first(
+    many_addresses: list[str],
+) -> None:
+    async with await asyncio.start_server(lambda _, writer: writer.close(), "127.0.0.1", 0) as server:
+        link = make_link(f"tcp://acu.example:{server.sockets[0].getsockname()[1]}")
+        with pytest.raises(LinkError, match=r"does not answer within 0\.05 s at 192\.0\.2\.1, one of 3 of its name"):
+            await link.open()
+        for _ in range(2):
+            await link.open()
+            await link.close()
+    assert many_addresses == ["192.0.2.1", "127.0.0.2", "127.0.0.1", "127.0.0.1"]
+
+
+async def test_who_opens_a_link_once_tries_every_address(many_addresses: list[str]) -> None:
+    async with await asyncio.start_server(lambda _, writer: writer.close(), "127.0.0.1", 0) as server:
+        link = make_link(f"tcp://acu.example:{server.sockets[0].getsockname()[1]}")
+        await open_once(link)
+        await link.close()
+    many_addresses.clear()
+    with pytest.raises(LinkError):
+        await open_once(make_link("tcp://acu.example:1"))
+    assert set(many_addresses) == {"192.0.2.1", "127.0.0.2", "127.0.0.1"}
 
 
 async def test_of_a_line_that_babbles_only_the_newest_bytes_wait() -> None:
@@ -378,6 +461,79 @@ async def test_a_serial_port_is_opened_exclusively(pty: Pty) -> None:
     await first.close()
     await second.open()
     await second.close()
+
+
+def open_as_another_user(path: str) -> str:
+    """What a user without rights gets who opens it: "opened", or the error."""
+    code = f"import os\ntry: os.open({path!r}, os.O_RDWR | os.O_NOCTTY); print('opened')\nexcept OSError as e: print(e)"
+    done = subprocess.run([*as_nobody(), sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+async def test_while_the_link_is_open_no_other_user_can_open_the_port_and_afterwards_each_can(pty: Pty) -> None:
+    Path(pty.path).chmod(0o666)
+    link = make_link(f"serial://{pty.path}")
+    assert open_as_another_user(pty.path) == "opened"
+    await link.open()
+    assert "Device or resource busy" in open_as_another_user(pty.path)
+    await link.close()
+    assert open_as_another_user(pty.path) == "opened"
+
+
+async def test_a_simulated_port_that_a_killed_client_kept_to_itself_can_be_opened_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("acu_daemon.sim.pty.FREE_S", 0.01)
+    async with serve_pty(lambda _send, _hang_up: Deaf(), FaultBoard(), tmp_path / "acu", 9600):
+        device = str((tmp_path / "acu").readlink())
+        Path(device).chmod(0o666)
+        with open(device, "rb", 0) as client:  # noqa: ASYNC230, PTH123
+            fcntl.flock(client, fcntl.LOCK_EX)
+            fcntl.ioctl(client, termios.TIOCEXCL)
+            await asyncio.sleep(0.05)  # several looks
+            assert "busy" in open_as_another_user(device)
+        while "busy" in open_as_another_user(device):
+            await asyncio.sleep(0)
+
+
+class Deaf:
+    """A peer that hears nothing."""
+
+    def receive(self, data: bytes) -> None: ...
+
+    def close(self) -> None: ...
+
+
+async def test_who_holds_a_port_is_told_by_name(pty: Pty) -> None:
+    code = f"import fcntl; f = open({pty.path!r}, 'rb', 0); fcntl.flock(f, fcntl.LOCK_EX); print('held'); input()"
+    command = [sys.executable, "-uc", code]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout is not None
+        other.stdout.readline()
+        with pytest.raises(LinkRefusedError, match=rf"held by another program \(python.*, process {other.pid}\)"):
+            await make_link(f"serial://{pty.path}").open()
+        other.kill()
+
+
+async def test_a_program_that_reads_the_line_beside_us_is_told_and_not_called_an_unplugged_adapter(pty: Pty) -> None:
+    link = make_link(f"serial://{pty.path}")
+    await link.open()
+    os.write(pty.master, b"stolen")
+    assert os.read(pty.slave, 100) == b"stolen"
+    link._on_readable()  # type: ignore[attr-defined]  # as when the loop was woken before
+    with pytest.raises(LinkRefusedError, match="another program reads this line"):
+        await link.read()
+    await link.close()
+
+
+async def test_what_was_drained_in_the_same_turn_is_no_other_programs_theft(pty: Pty) -> None:
+    link = make_link(f"serial://{pty.path}")
+    await link.open()
+    link.drain_input()
+    link._on_readable()  # type: ignore[attr-defined]
+    os.write(pty.master, b"x")
+    assert (await link.read())[0] == b"x"
+    await link.close()
 
 
 async def test_a_missing_port_is_named_with_a_hint(tmp_path: Path) -> None:

@@ -189,3 +189,25 @@ def test_p10_what_a_killed_process_left_unfinished_is_taken_up_again(tmp_path: P
     replace_file(path, b"whole")
     assert path.read_bytes() == b"whole"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_without_a_thread_jobs_are_done_at_once_and_that_is_told_until_there_is_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def denied(_: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    done: list[int] = []
+    with monkeypatch.context() as system:
+        system.setattr(threading.Thread, "start", denied)
+        writer = Writer("files")
+        assert writer.put(lambda: done.append(1))
+        assert done == [1]
+        assert writer.problem == "the system denies a thread: the loop itself waits for the disk"
+        never = Writer("log")
+        assert never.put(lambda: 1 / 0)
+        assert never.close()
+    assert writer.put(lambda: done.append(threading.get_ident()))
+    assert writer.problem == ""
+    assert writer.close()
+    assert done[1] != threading.get_ident()

@@ -68,9 +68,7 @@ class TcpLink:
         raise self._unreachable(refused)
 
     def _unanswered(self, address: str, address_count: int) -> LinkError:
-        others = (
-            f" at {address}; its name has {address_count} addresses, the next is tried" if address_count > 1 else ""
-        )
+        others = f" at {address}, one of {address_count} of its name" if address_count > 1 else ""
         return LinkError(
             f"{self.description} does not answer within {CONNECT_TIMEOUT_S:g} s{others}: "
             "check the address, that the ACU is on, and that no firewall drops the connection"
