@@ -487,7 +487,7 @@ async def test_a_simulated_port_that_a_killed_client_kept_to_itself_can_be_opene
     async with serve_pty(lambda _send, _hang_up: Deaf(), FaultBoard(), tmp_path / "acu", 9600):
         device = str((tmp_path / "acu").readlink())
         Path(device).chmod(0o666)
-        with open(device, "rb", 0) as client:  # noqa: ASYNC230, PTH123
+        with open(device, "rb", 0) as client:  # noqa: PTH123
             fcntl.flock(client, fcntl.LOCK_EX)
             fcntl.ioctl(client, termios.TIOCEXCL)
             await asyncio.sleep(0.05)  # several looks
