@@ -149,6 +149,7 @@ class FitResult:
     covariance: Array | None = field(default=None, compare=False, repr=False)  # (13, 13), see assist.full_states
 
 
+MOST_DEG = 1e5  # more is no azimuth, however often the path goes round, and no rate
 PredictionKind = Literal["FITTED", "TLE"]
 
 
@@ -173,6 +174,16 @@ class Pointing:
     el_deg: float
     az_rate_deg_s: float
     el_rate_deg_s: float
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether all of it are numbers that an angle can have."""
+        return (
+            abs(self.az_deg) <= MOST_DEG
+            and abs(self.el_deg) <= MOST_DEG
+            and abs(self.az_rate_deg_s) <= MOST_DEG
+            and abs(self.el_rate_deg_s) <= MOST_DEG
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,6 +210,17 @@ class Prediction:
     late_drift_deg_s: Array | None = None  # (2, N): right and up, what a second of lateness moves beside `at`
 
     @property
+    def is_finite(self) -> bool:
+        """Whether every sample of it is finite; a sigma may be infinite, but is a number."""
+        arrays = (
+            *(self.az_deg, self.el_deg, self.az_rate_deg_s, self.el_rate_deg_s),
+            *(self.follow_az_deg, self.follow_az_rate_deg_s),
+        )
+        is_sigma = self.sigma_deg is None or not bool(np.isnan(self.sigma_deg).any())
+        more = [one for one in (self.late_drift_deg_s, self.spread) if one is not None]
+        return is_sigma and all(bool(np.isfinite(one).all()) for one in (*arrays, *more))
+
+    @property
     def end_tai_s(self) -> float:
         return self.start_tai_s + self.step_s * (self.az_deg.size - 1)
 
@@ -207,7 +229,7 @@ class Prediction:
         if self.sigma_deg is None:
             return None
         first = min(max(round((tai_s - self.start_tai_s) / self.step_s), 0), self.sigma_deg.size - 1)
-        beyond = np.flatnonzero(3.0 * self.sigma_deg[first:] > limit_deg)
+        beyond = np.flatnonzero(~(self.sigma_deg[first:] <= limit_deg / 3.0))  # what is no number is beyond
         return self.step_s * float(beyond[0] if beyond.size else self.sigma_deg.size - 1 - first)
 
     def at(self, tai_s: float, *, follow: bool = False) -> Pointing | None:

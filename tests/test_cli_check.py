@@ -342,3 +342,16 @@ def test_the_health_check_looks_only_whether_the_daemon_ticks(tmp_path: Path) ->
     stale = acu_daemon(*asked)
     assert stale.code == 1
     assert "s ago" in lines(stale)["running daemon"][1]
+
+
+def test_an_axis_whose_limits_do_not_hold_the_pass_is_a_warning_with_its_times(tmp_path: Path) -> None:
+    with acu() as small:
+        config = write(tmp_path, flat_station(station(small.url)), scd=BROUWER)
+        done = acu_daemon("check", "--config", config)
+    assert (done.code, lines(done)["scd: elevation"][0]) == (0, "WARN")
+    said = [line for line in done.out.splitlines() if "scd: elevation" in line]
+    assert any("elevation below 7 deg for" in line and "the other axis follows" in line for line in said)
+
+
+def flat_station(text: str) -> str:
+    return replaced(text, "min_deg = 0.0\nmax_deg = 90.0", "min_deg = 7.0\nmax_deg = 30.0")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from command_line import Done, acu_daemon
-from config_files import BROUWER, from_file, replaced, write
+from config_files import BROUWER, STATION, from_file, replaced, write
 
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 
@@ -127,3 +127,17 @@ def test_every_line_of_a_complaint_names_the_program(tmp_path: Path) -> None:
     assert done.code == 2
     assert len(done.err.splitlines()) >= 2
     assert all(line.startswith("acu-daemon: ") for line in done.err.splitlines())
+
+
+def test_a_pass_that_an_axis_cannot_follow_says_which_from_when_and_for_how_long(tmp_path: Path) -> None:
+    flat = replaced(STATION, "min_deg = 0.0\nmax_deg = 90.0", "min_deg = 0.0\nmax_deg = 30.0")
+    config = write(tmp_path, flat, scd=BROUWER)
+    found = json.loads(passes(config, "--json").out)
+    high = [one for one in found if one["culmination_el_deg"] > 31.0]
+    assert high
+    for one in found:
+        beyond = [span for span in one["beyond_limits"] if span["axis"] == "elevation"]
+        assert bool(beyond) is (one["culmination_el_deg"] > 30.0)
+    [span] = high[0]["beyond_limits"]
+    assert tai_from_utc(high[0]["rise_utc"]) < tai_from_utc(span["from_utc"]) < tai_from_utc(high[0]["culmination_utc"])
+    assert "elevation above 30 deg" in passes(config).out

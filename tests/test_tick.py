@@ -23,6 +23,7 @@ from acu_daemon.control.state import (
 from acu_daemon.control.states import ACTIVE, TrackState
 from acu_daemon.control.tick import EXTRA_REPEAT_S, tick
 from acu_daemon.model import AxisLimits, Prediction, Reading
+from acu_daemon.pointing.axis import AxisState
 from acu_daemon.protocol.angles import LSB_DEG
 from acu_daemon.protocol.messages import (
     AcuMode,
@@ -321,13 +322,33 @@ def test_a_stow_from_elsewhere_ends_every_active_state_and_nothing_leaves_it(tra
 
 def test_p5_what_the_gate_refuses_is_counted_every_time_and_logged_once() -> None:
     held = status(AcuMode.REMOTE_BACKUP)
-    beyond = replace(FITTED, prediction=replace(path("FITTED"), el_deg=path().el_deg + 60.0))
+    wrong = replace(FITTED, prediction=replace(path("FITTED"), el_deg=path().el_deg + np.nan))
     state, events = replace(ready(TrackState.HOLD_FITTED, held), hold_from_tai_s=NOW), []
-    for k, sky in enumerate([beyond, beyond, FITTED, beyond]):
+    for k, sky in enumerate([wrong, wrong, FITTED, wrong]):
         state, orders = tick(state, saw(held), sky, NOW + 0.1 * k, CONFIG)
         events.append([event.fields["reason"] for event in orders.events if event.name == "gate.refused"])
     assert state.gate_refusal_count == 3
-    assert events == [["elevation outside 0 to 90 deg"], [], [], ["elevation outside 0 to 90 deg"]]
+    assert events == [["not a finite angle"], [], [], ["not a finite angle"]]
+
+
+@pytest.mark.parametrize("mode", [AcuMode.REMOTE_BACKUP, AcuMode.AUTOTRACK])
+def test_p5_an_axis_outside_its_limits_is_held_there_and_the_other_one_follows(mode: AcuMode) -> None:
+    """Counted with every write, told once for each edge, and not at once again when it comes and goes."""
+    held = status(mode)
+    flat = replace(CONFIG, elevation=replace(CONFIG.elevation, max_deg=38.0))
+    track = TrackState.HOLD_FITTED if mode is AcuMode.REMOTE_BACKUP else TrackState.AUTOTRACK_FITTED
+    state, told = replace(ready(track, held), hold_from_tai_s=NOW, axis_el=AxisState(38.0)), []
+    within = replace(FITTED, prediction=replace(path("FITTED"), el_deg=path().el_deg - 5.0))
+    for k in range(60):
+        sky = within if 20 <= k < 25 or k >= 30 else FITTED
+        state, orders = tick(state, saw(held), sky, NOW + 0.1 * k, flat)
+        told += [(k, event.name) for event in orders.events if event.name.startswith("gate.")]
+        assert isinstance(orders.first, WriteAndPoll)
+        assert orders.first.el_deg <= 38.0
+        assert orders.first.az_deg == pytest.approx(AZ_DEG + AZ_RATE * (0.1 * k + LEAD_S), abs=0.1)
+    assert [name for _, name in told] == ["gate.limited", "gate.within_limits"]
+    assert (state.gate_limited_count, state.gate_refusal_count) == (25, 0)
+    assert state.limited == ""
 
 
 def test_p5_what_the_gate_holds_back_is_counted() -> None:

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acu_daemon.model import AxisLimits
-from acu_daemon.pointing.wrap import choose_turn, encoder_continuous, nearest_turn, sector_for
+from acu_daemon.pointing.wrap import choose_turn, encoder_continuous, nearest_end_deg, nearest_turn, sector_for
 
 WRAP = AxisLimits(-270.0, 270.0, 20.0, 10.0)
 
@@ -82,3 +82,74 @@ def test_bearing_and_sector_give_back_the_continuous_angle(continuous):
 def test_a_bearing_rounded_across_the_middle_stays_beside_it():
     assert encoder_continuous(359.9945, True, WRAP) == pytest.approx(-0.0055)
     assert encoder_continuous(0.0, False, WRAP) == pytest.approx(0.0)
+
+
+RANGES_OF_ONE_TURN = [(0.0, 360.0), (-180.0, 180.0), (-90.0, 270.0), (10.0, 350.0), (-170.0, 170.0), (30.0, 200.0)]
+
+
+def _limits(min_deg: float, max_deg: float) -> AxisLimits:
+    return AxisLimits(min_deg, max_deg, 20.0, 10.0)
+
+
+@pytest.mark.parametrize("bit", [False, True])
+@pytest.mark.parametrize(("min_deg", "max_deg"), RANGES_OF_ONE_TURN)
+@given(share=st.floats(0.0005, 0.9995))
+def test_with_a_range_of_at_most_a_turn_the_only_turn_inside_is_taken_whatever_the_bit_says(
+    min_deg, max_deg, bit, share
+):
+    continuous = min_deg + share * (max_deg - min_deg)
+    assert encoder_continuous(continuous % 360.0, bit, _limits(min_deg, max_deg)) == pytest.approx(continuous, abs=1e-9)
+
+
+@pytest.mark.parametrize("bit", [False, True])
+def test_an_azimuth_of_300_in_a_range_of_0_to_360_is_300(bit):
+    assert encoder_continuous(300.0, bit, _limits(0.0, 360.0)) == 300.0
+
+
+@pytest.mark.parametrize("bit", [False, True])
+@pytest.mark.parametrize(("bearing", "continuous"), [(300.0, 300.0), (91.0, 91.0), (359.0, 359.0)])
+def test_in_a_wider_range_a_bearing_that_one_turn_reaches_needs_no_bit(bearing, continuous, bit):
+    assert encoder_continuous(bearing, bit, _limits(0.0, 450.0)) == continuous
+
+
+@given(continuous=st.floats(0.0, 450.0), min_deg=st.sampled_from([0.0, -90.0, -270.0]))
+def test_in_a_wider_range_a_right_bit_gives_the_right_turn(continuous, min_deg):
+    limits, there = _limits(min_deg, min_deg + 450.0), continuous + min_deg
+    assert encoder_continuous(there % 360.0, there >= min_deg + 225.0, limits) == pytest.approx(there, abs=1e-9)
+
+
+@given(continuous=st.floats(-270.0, 270.0), step=st.floats(-150.0, 150.0), bit=st.booleans())
+def test_where_the_axis_was_decides_before_the_bit(continuous, step, bit):
+    near = min(max(continuous + step, -270.0), 270.0)
+    assert encoder_continuous(continuous % 360.0, bit, WRAP, near_deg=near) == pytest.approx(continuous, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("bearing", "end", "near", "continuous"),
+    [
+        (359.9945, -1, None, -0.0055),  # an LSB below the lower end
+        (0.0055, 1, None, 360.0055),
+        (0.0, 1, None, 360.0),
+        (359.9945, 0, 0.003, -0.0055),
+        (0.0055, 0, 359.99, 360.0055),
+        (359.9945, 0, None, 359.9945),
+        (0.0055, 0, None, 0.0055),
+    ],
+)
+def test_at_the_ends_of_exactly_a_turn_the_limit_switch_and_the_last_place_decide(bearing, end, near, continuous):
+    found = encoder_continuous(bearing, False, _limits(0.0, 360.0), near_deg=near, end=end)
+    assert found == pytest.approx(continuous, abs=1e-9)
+
+
+def test_a_bearing_that_no_turn_reaches_is_shown_beside_the_end_it_is_nearest_to():
+    limits = _limits(-170.0, 160.0)
+    assert encoder_continuous(185.0, True, limits) == -175.0
+    assert encoder_continuous(165.0, False, limits) == 165.0
+
+
+def test_a_bearing_between_the_ends_goes_to_the_nearer_one_and_in_the_middle_stays_where_it_is():
+    limits = _limits(-150.0, 150.0)
+    assert nearest_end_deg(160.0, 0.0, limits) == 150.0
+    assert nearest_end_deg(200.0, 0.0, limits) == -150.0
+    assert nearest_end_deg(178.0, -100.0, limits) == nearest_end_deg(182.0, -100.0, limits) == -150.0
+    assert nearest_end_deg(178.0, 100.0, limits) == nearest_end_deg(182.0, 100.0, limits) == 150.0

@@ -36,6 +36,7 @@ from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.sun import RISEN_EL_DEG, sun_direction_deg
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.orbit.visibility import why_none
+from acu_daemon.pointing.wrap import middle_deg
 from acu_daemon.protocol.messages import AcuMode, Faults, Identify, Identity, ReadFaults, Reply, Status
 from acu_daemon.protocol.sa3842 import address_byte
 from acu_daemon.units import DAY_S, wrap_180
@@ -70,7 +71,7 @@ def command(
     ] = False,
     state: Annotated[Path | None, typer.Option("--state", metavar="DIR", help="The daemon's --state.")] = None,
 ) -> None:
-    """Check everything a pass needs: files, clock, elements, next pass, cable wrap, link, ACU.  Moves nothing.
+    """Check everything a pass needs: files, clock, elements, next pass, cable wrap, axes, link, ACU.  Moves nothing.
 
     A line per check, GO, WARN or NO-GO; exit status 1 if any is NO-GO.
     """
@@ -150,7 +151,8 @@ def _alarms(snapshot: Path) -> list[str]:
     try:
         seen = json.loads(snapshot.read_text(encoding="utf-8"))
         latch, disarmed_by = seen.get("latch", ""), seen.get("disarmed_by", "")
-        others = [seen.get(name, "") for name in ("clock_alarm", "encoder_problem", "files_alarm")]
+        names = ("clock_alarm", "encoder_problem", "files_alarm", "turn_alarm", "limit_alarm")
+        others = [seen.get(name, "") for name in names]
     except (OSError, ValueError, AttributeError):
         return []
     texts = [latch and f"latched: {latch}", disarmed_by and f"disarmed by {disarmed_by}", *others]
@@ -215,13 +217,15 @@ def _next_pass(name: str, target: Target, now_tai_s: float) -> Iterator[Finding]
     )
     if not is_ephemeris and (until := ending(target, now_tai_s + NEXT_PASS_DAYS * DAY_S)):
         yield Finding(WARN, f"{name}: decay", until)
-    limits = station.acu.azimuth.limits()
-    middle_deg = (limits.min_deg + limits.max_deg) / 2
-    plan = plan_pass(propagator, station.site, coming, middle_deg, limits, coming.rise_tai_s)
+    azimuth, elevation = station.acu.azimuth.limits(), station.acu.elevation.limits()
+    start_tai_s = coming.rise_tai_s
+    plan = plan_pass(propagator, station.site, coming, middle_deg(azimuth), azimuth, start_tai_s, elevation=elevation)
     if plan.note:
         yield Finding(WARN, f"{name}: cable wrap", plan.note)
     else:
         yield Finding(GO, f"{name}: cable wrap", f"the pass is held from azimuth {plan.start_az_deg:.1f} deg on")
+    for one in plan.beyond:
+        yield Finding(WARN, f"{name}: {one.axis}", str(one))
 
 
 async def _acu(acu: AcuSection) -> list[Finding]:

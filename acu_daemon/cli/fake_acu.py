@@ -68,8 +68,8 @@ def command(
 
     A scenario holds [sky] along_track_s, delta_raan_deg; [encoder] azimuth_bias_deg, elevation_bias_deg, noise_deg;
     [receiver] peak_agc_db, agc_noise_db, tracking_noise_deg; [acu] has_tilt, reply_latency_s, mode, azimuth_deg,
-    elevation_deg; and any number of [[loss]] with cause ("receiver", "silence-zone", "fade"), and start_s, duration_s
-    or from_utc, to_utc; and [[fault]], as above.
+    elevation_deg, sector_bit ("driven", "undriven", "random", "stuck-0", "stuck-1"); and any number of [[loss]] with
+    cause ("receiver", "silence-zone", "fade"), and start_s, duration_s or from_utc, to_utc; and [[fault]], as above.
     """
     clock = make_clock(at, at_monotonic)
     target = load_target(config, satellite, clock.tai_s(), is_strict=False)

@@ -10,6 +10,7 @@ import typer
 
 from acu_daemon.cli.options import Config, cut_passes, ending, gaps, load_target, open_ends, parse_utc
 from acu_daemon.config import load_station, satellite_names
+from acu_daemon.control.plan import beyond_limits
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.errors import AcuDaemonError, OrbitError, UsageError
 from acu_daemon.model import Pass
@@ -17,6 +18,7 @@ from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.propagator import spans_tai_s
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.orbit.visibility import why_none
+from acu_daemon.pointing.reach import OutOfReach
 from acu_daemon.units import DAY_S
 
 ROW = "{name:16} {rise:19}  {duration:>8}  {rise_az:>6}  {culmination:>6}  {culmination_az:>6}  {set_az:>6}"
@@ -27,6 +29,7 @@ class _Seen:
     """A satellite's passes within a search, why there are none, and what there is to say of elements and search."""
 
     passes: list[Pass]
+    beyond: dict[Pass, tuple[OutOfReach, ...]]  # when which axis cannot follow
     why_none: str
     said: list[str]
 
@@ -50,6 +53,8 @@ def command(
     ] = False,
 ) -> None:
     """Show the passes above the station's lowest elevation: rise, duration, culmination, set.
+
+    Where the limits of an axis do not hold a pass, its line says which axis cannot follow, from when, for how long.
 
     A satellite whose files or elements cannot be used is left out with its reason, the others are shown; exit status 2
     where none is left.
@@ -98,16 +103,18 @@ def _search(config: Path, name: str, start_tai_s: float, end_tai_s: float) -> _S
     found = find_passes(propagator, site, start_tai_s, end_tai_s, lowest_deg)
     said += [f"warning: {name}: {text}" for text in gaps(target, start_tai_s, end_tai_s) + cut_passes(target, found)]
     is_told = bool(found) or bool(until) or is_ephemeris
-    return _Seen(found, "" if is_told else why_none(propagator, site, start_tai_s, end_tai_s, lowest_deg), said)
+    limits = target.station.acu.azimuth.limits(), target.station.acu.elevation.limits()
+    beyond = {one: beyond_limits(propagator, site, one, *limits) for one in found}
+    return _Seen(found, beyond, "" if is_told else why_none(propagator, site, start_tai_s, end_tai_s, lowest_deg), said)
 
 
 def _show(
     seen: dict[str, _Seen], omitted: dict[str, str], start_tai_s: float, end_tai_s: float, *, as_json: bool
 ) -> None:
-    rows = [(name, one) for name, of in seen.items() for one in of.passes]
+    rows = [(name, one, of.beyond.get(one, ())) for name, of in seen.items() for one in of.passes]
     rows.sort(key=lambda row: row[1].rise_tai_s)
     if as_json:
-        passes = [_as_json(name, one, start_tai_s, end_tai_s) for name, one in rows]
+        passes = [_as_json(name, one, start_tai_s, end_tai_s) | _beyond(beyond) for name, one, beyond in rows]
         left_out = [{"satellite": name, "reason": reason} for name, reason in omitted.items()]
         typer.echo(json.dumps({"passes": passes, "omitted": left_out} if omitted else passes, indent=1))
         return
@@ -124,8 +131,9 @@ def _show(
             set_az="set az",
         )
     )
-    for name, one in rows:
-        typer.echo(f"{_as_text(name, one)}  {open_ends(one, start_tai_s, end_tai_s)}".rstrip())
+    for name, one, beyond in rows:
+        notes = [text for text in (open_ends(one, start_tai_s, end_tai_s), *map(_beyond_text, beyond)) if text]
+        typer.echo(f"{_as_text(name, one)}  {'; '.join(notes)}".rstrip())
     for name, of in seen.items():
         if of.why_none:
             typer.echo(f"{name}: {of.why_none}")
@@ -145,6 +153,25 @@ def _as_text(name: str, one: Pass) -> str:
         culmination_az=f"{one.culmination_az_deg:.1f}",
         set_az=f"{one.set_az_deg:.1f}",
     )
+
+
+def _beyond_text(one: OutOfReach) -> str:
+    return f"{one.why} {one.duration_s:.0f} s from {utc_text(one.from_tai_s, 0)[11:19]}"
+
+
+def _beyond(beyond: tuple[OutOfReach, ...]) -> dict[str, Any]:
+    return {
+        "beyond_limits": [
+            {
+                "axis": one.axis,
+                "from_utc": utc_text(one.from_tai_s),
+                "to_utc": utc_text(one.to_tai_s),
+                "duration_s": round(one.duration_s, 3),
+                "why": one.why,
+            }
+            for one in beyond
+        ]
+    }
 
 
 def _as_json(name: str, one: Pass, start_tai_s: float, end_tai_s: float) -> dict[str, Any]:

@@ -1,13 +1,17 @@
 """What the ACU said, taken into the memory of the decision: status, reading, replies, refusals.  Pure."""
 
+from dataclasses import replace
+from math import inf
+
+from acu_daemon.control.axis_watch import FAST_MARGIN, AxesWatch
 from acu_daemon.control.causes import is_acquired
 from acu_daemon.control.changed import changed
 from acu_daemon.control.encoder_watch import EncoderWatch, watch_encoders
 from acu_daemon.control.start import after_reply
 from acu_daemon.control.state import ControlConfig, ControlState, Event, Observation, Sky, Stage, Watchdog
 from acu_daemon.control.states import AUTOTRACKING
+from acu_daemon.control.turn import Phase, at_rest, locate
 from acu_daemon.model import Pointing, Reading
-from acu_daemon.pointing.wrap import encoder_continuous
 from acu_daemon.protocol.angles import LSB_DEG
 from acu_daemon.protocol.messages import AcuMode, Backup, Nak, Status, Stop
 
@@ -16,6 +20,7 @@ STEADY_SHARE = 0.1  # of a step of the registers: more change than that from one
 REFUSED_EXTRA_S = 2.0  # after a NAK the same extra command waits this long: no blind repetition
 REFUSED_PAUSE_S = 1.0  # a write that is refused again within REFUSED_AGAIN_S waits this long
 REFUSED_AGAIN_S = 2.0
+LONGEST_STEP_DEG = 170.0  # between two readings; with more the turn is not known by counting
 
 
 def absorb(
@@ -26,10 +31,11 @@ def absorb(
         state = _absorb_refusal(state, now_tai_s, events)
     if seen.status is not None and seen.reading is not None:
         state = _absorb_in_force(state, seen)
-        state = _absorb_reading(state, seen, seen.status, seen.reading, config)
+        state = _absorb_reading(state, seen, seen.status, seen.reading, config, events)
     if seen.status is not None and seen.reading is not None and seen.is_in_step:
         is_ours = is_acquired(seen.status) and state.track in AUTOTRACKING
         path = sky.prediction.at(seen.reading.tai_s) if sky.prediction and is_ours else None
+        path = path if path is not None and path.is_finite else None
         state = _absorb_encoders(state, path, seen.status, seen.reading, events)
     if seen.extra is not None:
         state = after_reply(state, seen.extra, now_tai_s, config, events)
@@ -68,9 +74,14 @@ def _absorb_encoders(
 
 
 def _absorb_reading(
-    state: ControlState, seen: Observation, status: Status, reading: Reading, config: ControlConfig
+    state: ControlState,
+    seen: Observation,
+    status: Status,
+    reading: Reading,
+    config: ControlConfig,
+    events: list[Event],
 ) -> ControlState:
-    az_deg = encoder_continuous(status.az_deg, status.is_sector_high, config.azimuth)
+    state, az_deg = _located(state, status, reading, config, events)
     if seen.is_in_step:
         state = _learn_lag(state, az_deg, status.el_deg)
     return changed(
@@ -83,6 +94,45 @@ def _absorb_reading(
         az_deg=az_deg,
         track_of_readings=(*state.track_of_readings[1 - RATE_READINGS :], (reading.tai_s, az_deg, status.el_deg)),
         is_stow_kept=_is_stow_kept(state, status),
+    )
+
+
+def _located(
+    state: ControlState, status: Status, reading: Reading, config: ControlConfig, events: list[Event]
+) -> tuple[ControlState, float]:
+    """The continuous azimuth.  Once the start is done, or the turn sure, it goes on from where it was."""
+    last, turn = state.reading, state.turn
+    moved_deg = inf if last is None else FAST_MARGIN * config.azimuth.max_rate_deg_s * (reading.tai_s - last.tai_s)
+    is_doubted = turn.phase is not Phase.BELIEVED or turn.wrong_half is not None
+    is_counted = state.stage is Stage.READY or turn.is_sure or is_doubted
+    near_deg = state.az_deg if is_counted and moved_deg < LONGEST_STEP_DEG else None
+    new, az_deg = locate(turn, status, config.azimuth, near_deg)
+    if new.wrong_half is not None and turn.wrong_half is None:
+        action = "the turn is counted without it"
+        fields = {"az_deg": az_deg, "sector_bit": int(status.is_sector_high), "action": action}
+        events.append(Event("sector.wrong", fields, is_warning=True))
+    elif turn.wrong_half is not None and new.wrong_half is None:
+        events.append(Event("sector.right"))
+    shift_deg = 360.0 * round((az_deg - state.az_deg) / 360.0) if near_deg is not None else 0.0
+    if shift_deg:
+        fields = {"az_deg": az_deg, "believed_deg": az_deg - shift_deg, "sector_bit": int(status.is_sector_high)}
+        events.append(Event("turn.corrected", fields, is_warning=True))
+        state = on_other_turn(state, shift_deg)
+        new = changed(at_rest(new), learned_count=new.learned_count + 1)
+    return changed(state, turn=new), az_deg
+
+
+def on_other_turn(state: ControlState, shift_deg: float) -> ControlState:
+    """Everything that is remembered in continuous azimuth, by a multiple of 360 deg further on."""
+    register, in_force = state.axis_az, state.in_force
+    return changed(
+        state,
+        az_deg=state.az_deg + shift_deg,
+        axis_az=None if register is None else replace(register, position_deg=register.position_deg + shift_deg),
+        track_of_readings=tuple((tai_s, az + shift_deg, el) for tai_s, az, el in state.track_of_readings),
+        commands=(),
+        in_force=None if in_force is None else (in_force[0], in_force[1] + shift_deg, in_force[2]),
+        axes=AxesWatch(),
     )
 
 

@@ -20,6 +20,7 @@ FAST_MARGIN = 2.0  # of the drive's rate: faster than that no drive is by its ow
 FAST_S = 1.0
 GAP_S = 1.0  # without a reading for so long, everything begins anew
 LEAST_COS_EL = 0.01
+AWAY = "moves away from its command"
 
 STANDING_MODES = (AcuMode.STANDBY, AcuMode.ACQUIRE, AcuMode.POSITION_MEMORY, AcuMode.STOWED)
 UNWATCHED_MODES = (AcuMode.MANUAL, AcuMode.FAULT, AcuMode.STOWING)  # somebody else's hand, or no drive
@@ -147,7 +148,7 @@ def _watch_following(
     braking_deg, braking_s = _braking(watch, limits)
     watch, wrong_s = _wrong_for_s(watch, seen, is_wrong=nearer_deg < -error_deg - braking_deg)
     if wrong_s >= AWAY_S:
-        return watch, "moves away from its command"
+        return watch, AWAY
     if seen.tai_s - watch.mark_tai_s >= bounds.error_s + braking_s and wrong_s < 0.0:
         return watch, "stands still away from its command"
     return watch, ""

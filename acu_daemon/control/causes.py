@@ -1,16 +1,20 @@
 """Which causes of a transition are present now (control.states has the table they drive)."""
 
-from math import hypot
+from dataclasses import replace
+from math import hypot, isfinite
 
 from acu_daemon.control.approach import ACQUIRE_LEAD_S, lead_s
+from acu_daemon.control.gate import within_limits
 from acu_daemon.control.state import ControlConfig, ControlState, PassPlan, Sky, Stage
 from acu_daemon.control.states import HOLDING, Cause, TrackState
 from acu_daemon.control.track_frame import extents, is_within, offset_of
 from acu_daemon.model import Pointing, sky_angle_deg
+from acu_daemon.pointing.wrap import nearest_turn
 from acu_daemon.protocol.messages import AcuMode, Status
 
 LINK_SILENCE_S = 0.5  # ICD section 1
 ON_POINT_BEAMS = 0.25
+HEARD_BEAMS = 1.0  # a signal that is heard so near to the path is the satellite's
 RESUME_DEG = 5.0  # an antenna this near to the path goes on from an interruption without a new approach
 BEFORE = frozenset({TrackState.IDLE, TrackState.PREPOSITION})  # only there it matters where the antenna stands
 MODE_SETTLE_S = 3.0  # a MODE SELECT takes a moment to show; only later is a left mode the ACU's own doing
@@ -18,7 +22,8 @@ MODE_SETTLE_S = 3.0  # a MODE SELECT takes a moment to show; only later is a lef
 
 def pass_end_tai_s(plan: PassPlan, sky: Sky) -> float:
     """The end of the pass: its set by the elements, shifted by what the fit found, early or late."""
-    return plan.set_tai_s + (sky.fit.along_s if sky.fit else 0.0) + 1.0
+    along_s = sky.fit.along_s if sky.fit and isfinite(sky.fit.along_s) else 0.0
+    return plan.set_tai_s + along_s + 1.0
 
 
 def find_causes(state: ControlState, sky: Sky, silence_s: float, now_tai_s: float, config: ControlConfig) -> set[Cause]:
@@ -86,7 +91,7 @@ def _is_ours(state: ControlState, status: Status, sky: Sky, now_tai_s: float, co
     if state.track not in BEFORE:
         return True
     target = path_point(sky, now_tai_s)
-    if target is None:
+    if target is None or not target.is_finite:
         return True
     if sky.prediction is None or _distance_deg(state, status, target) < RESUME_DEG:
         return True
@@ -104,17 +109,34 @@ def _of_plan(state: ControlState, status: Status, sky: Sky, now_tai_s: float, co
         causes.add(Cause.PASS_NEAR)
     if state.track in BEFORE and now_tai_s >= plan.rise_tai_s - ACQUIRE_LEAD_S:
         target = path_point(sky, now_tai_s)
-        causes |= _of_place(state, status, sky, target, config) if target is not None else set()
+        if target is not None and target.is_finite:
+            is_in_pass = now_tai_s >= plan.rise_tai_s
+            causes |= _of_place(state, status, sky, _reached(target, state, config), config, is_in_pass=is_in_pass)
     return causes
 
 
-def _of_place(state: ControlState, status: Status, sky: Sky, target: Pointing, config: ControlConfig) -> set[Cause]:
-    """How near the antenna is to the path, once a signal may come."""
+def _reached(target: Pointing, state: ControlState, config: ControlConfig) -> Pointing:
+    """As near to the path as the limits of the axes allow."""
+    az_deg = nearest_turn(target.az_deg, target.az_deg, config.azimuth)
+    target = target if az_deg is None else replace(target, az_deg=az_deg)
+    return within_limits(target, state.az_deg, config)[0]
+
+
+def _of_place(
+    state: ControlState, status: Status, sky: Sky, target: Pointing, config: ControlConfig, *, is_in_pass: bool
+) -> set[Cause]:
+    """How near the antenna is to the path, once a signal may come.
+
+    Not the same bearing on another turn of the wrap; but in the pass a signal from there is taken on any turn, without
+    a move first: which turn is the true one may be in doubt.
+    """
     has_fit = sky.prediction is not None and sky.prediction.kind == "FITTED"
     distance_deg = _distance_deg(state, status, target)
-    is_on_turn = abs(state.az_deg - target.az_deg) < 90.0  # not the same bearing on another turn of the wrap
+    is_on_turn = abs(state.az_deg - target.az_deg) < 90.0
+    is_there = status.mode is AcuMode.REMOTE and is_on_turn and distance_deg < ON_POINT_BEAMS * config.beamwidth_deg
+    is_heard = is_in_pass and not is_on_turn and status.is_acquired and status.mode in (AcuMode.REMOTE, AcuMode.STANDBY)
     causes: set[Cause] = set()
-    if status.mode is AcuMode.REMOTE and is_on_turn and distance_deg < ON_POINT_BEAMS * config.beamwidth_deg:
+    if is_there or (is_heard and distance_deg < HEARD_BEAMS * config.beamwidth_deg):
         causes.add(Cause.ON_POINT_FITTED if has_fit else Cause.ON_POINT)
     if distance_deg < RESUME_DEG:
         if has_fit:

@@ -1,7 +1,8 @@
 """The safety gate: the last thing that happens to a register write; none passes beside it (design section 3).
 
-Not finite or outside the limits: refused with a reason, the last good value stays.  Registers that the antenna follows
-are clamped to what the axis can do; registers it does not follow hold the true path, also through the zenith.
+Not finite: refused with a reason, the last good value stays.  Outside the limits: each axis goes as near as they allow,
+and the other one follows.  Registers that the antenna follows are clamped to what the axis can do; registers it does
+not follow hold the true path, also through the zenith.
 """
 
 from dataclasses import dataclass, replace
@@ -11,9 +12,10 @@ from math import copysign, cos, isfinite, radians
 from acu_daemon.control.state import ControlConfig, ControlState
 from acu_daemon.model import AxisLimits, Pointing
 from acu_daemon.pointing.axis import AxisState, step
+from acu_daemon.pointing.wrap import nearest_end_deg
 from acu_daemon.protocol.angles import clamp_deg
 
-LIMIT_SLACK_DEG = 0.1  # noise of a reading at a limit is clamped; more than that is refused
+LIMIT_SLACK_DEG = 0.1  # noise of a reading at a limit is clamped without a word
 PATH_MARGIN = 0.98  # of the drive's limits, on the path: the time between two writes is only nominally the period
 NEAR_DEG, NEAR_DEG_S = 0.5, 2.0  # nearer than this to the path in angle and rate is on it
 CHASE_RATE_MARGIN = 0.9  # while it chases the path: an antenna that fell behind must be able to catch up,
@@ -34,6 +36,7 @@ class Passed:
     el: AxisState
     is_held_back: bool
     refusal: str = ""
+    limited: str = ""  # which axis is held at its limit, for people
 
 
 def gate(
@@ -41,10 +44,10 @@ def gate(
 ) -> Passed:
     """Let a wanted pointing pass, hold it back, or refuse it.  dt_s: since the last write."""
     az, el = _from(state, now_tai_s, is_followed=is_followed)
-    refusal = _refusal(wanted, config)
-    if refusal:
+    if not wanted.is_finite:
         az, el = replace(az, rate_deg_s=0.0), replace(el, rate_deg_s=0.0)
-        return Passed(_legal(az, config.azimuth), _legal(el, config.elevation), True, refusal)
+        return Passed(_legal(az, config.azimuth), _legal(el, config.elevation), True, "not a finite angle")
+    wanted, limited = within_limits(wanted, az.position_deg, config)
     new_az, new_el = (
         AxisState(wanted.az_deg, wanted.az_rate_deg_s),
         AxisState(wanted.el_deg, wanted.el_rate_deg_s),
@@ -56,20 +59,36 @@ def gate(
         new_az = _reachable(az, _waiting(az, antenna_az, new_az), dt_s, config.azimuth, half_beam_az_deg)
         new_el = _reachable(el, _waiting(el, antenna_el, new_el), dt_s, config.elevation, half_beam_deg)
     is_held_back = new_az.position_deg != wanted.az_deg or new_el.position_deg != wanted.el_deg
-    return Passed(_legal(new_az, config.azimuth), _legal(new_el, config.elevation), is_held_back)
+    return Passed(_legal(new_az, config.azimuth), _legal(new_el, config.elevation), is_held_back, limited=limited)
 
 
-def _refusal(wanted: Pointing, config: ControlConfig) -> str:
-    values = (wanted.az_deg, wanted.el_deg, wanted.az_rate_deg_s, wanted.el_rate_deg_s)
-    if not all(isfinite(value) for value in values):
-        return "not a finite angle"
-    for name, angle_deg, limits in (
-        ("azimuth", wanted.az_deg, config.azimuth),
-        ("elevation", wanted.el_deg, config.elevation),
-    ):
-        if not limits.min_deg - LIMIT_SLACK_DEG <= angle_deg <= limits.max_deg + LIMIT_SLACK_DEG:
-            return f"{name} outside {limits.min_deg:g} to {limits.max_deg:g} deg"
-    return ""
+def within_limits(wanted: Pointing, near_az_deg: float, config: ControlConfig) -> tuple[Pointing, str]:
+    """Take each axis as near to a finite pointing as its limits allow; what is held there is said.
+
+    An azimuth that no turn reaches goes to the end of the range that is nearest to its bearing; near_az_deg (the
+    register, or the antenna) decides where both are.
+    """
+    if is_within(wanted.az_deg, config.azimuth) and is_within(wanted.el_deg, config.elevation):
+        return wanted, ""
+    held = []
+    if not is_within(wanted.az_deg, config.azimuth):
+        end_deg = nearest_end_deg(wanted.az_deg, near_az_deg, config.azimuth)
+        wanted = replace(wanted, az_deg=end_deg, az_rate_deg_s=0.0)
+        held.append(_held_text("azimuth", end_deg, config.azimuth))
+    if not is_within(wanted.el_deg, config.elevation):
+        end_deg = min(max(wanted.el_deg, config.elevation.min_deg), config.elevation.max_deg)
+        wanted = replace(wanted, el_deg=end_deg, el_rate_deg_s=0.0)
+        held.append(_held_text("elevation", end_deg, config.elevation))
+    return wanted, "; ".join(held)
+
+
+def is_within(angle_deg: float, limits: AxisLimits) -> bool:
+    """Whether an axis reaches an angle; one at a limit has noise."""
+    return limits.min_deg - LIMIT_SLACK_DEG <= angle_deg <= limits.max_deg + LIMIT_SLACK_DEG
+
+
+def _held_text(name: str, end_deg: float, limits: AxisLimits) -> str:
+    return f"{name} outside {limits.min_deg:g} to {limits.max_deg:g} deg, held at {end_deg:g}"
 
 
 def _from(state: ControlState, now_tai_s: float, *, is_followed: bool) -> tuple[AxisState, AxisState]:
@@ -149,4 +168,6 @@ def _share(limits: AxisLimits, rate: float, acceleration: float) -> AxisLimits:
 
 
 def _legal(axis: AxisState, limits: AxisLimits) -> AxisState:
+    if not isfinite(axis.position_deg):
+        return axis  # nothing good was known: the fence keeps it back
     return AxisState(clamp_deg(axis.position_deg, limits.min_deg, limits.max_deg), axis.rate_deg_s)

@@ -7,9 +7,10 @@ the emergency stop and an open door.  The latch stays until a person clears it, 
 from collections.abc import Iterable
 from math import inf
 
-from acu_daemon.control.axis_watch import AxesWatch, AxisSeen, duty_of, sky_scale, watch_axes
+from acu_daemon.control.axis_watch import AWAY, AxisSeen, duty_of, sky_scale, watch_axes
 from acu_daemon.control.changed import changed
-from acu_daemon.control.start import WATCHDOG
+from acu_daemon.control.relearn import doubt, may_be_other_turn
+from acu_daemon.control.start import WATCHDOG, anew
 from acu_daemon.control.state import ControlConfig, ControlState, Event, Held, Observation, Request, Stage, Watchdog
 from acu_daemon.control.states import ACTIVE, TrackState
 from acu_daemon.protocol.messages import AcuMode, Backup, Command, Faults, Nak, ReadFaults, Status, Stop, WriteParameter
@@ -19,6 +20,7 @@ NO_STOP_MODES = (AcuMode.MANUAL, AcuMode.STOWING, AcuMode.STOWED, AcuMode.FAULT)
 STOPPED_FROM = (AcuMode.REMOTE, AcuMode.ACQUIRE, AcuMode.AUTOTRACK, AcuMode.REMOTE_BACKUP)
 ANOTHER_HAND = "another hand that stopped the antenna"
 RATE_SPAN_S = 1.0
+AZIMUTH_AWAY = f"azimuth {AWAY}"
 EMERGENCY_STOP, DOOR_OPEN = 1, 2  # of the interlock nibble, ICD section 4
 WATCHDOG_TRIPPED = 2  # of the system nibble
 
@@ -29,13 +31,13 @@ def obey(state: ControlState, requests: Iterable[Request], config: ControlConfig
         if request is Request.CLEAR and state.latch:
             events.append(Event("latch.cleared", {"latch": state.latch}))
             is_stop_due = state.is_stop_due and not state.is_armed(config)
-            state = changed(_anew(state), latch="", is_stop_due=is_stop_due)
+            state = changed(anew(state), latch="", is_stop_due=is_stop_due)
         elif request is Request.ARM and not config.is_shadow:
             state = changed(state, held=None, is_stop_doubted=False)  # whoever says so has seen how the antenna stands
             if not state.is_armed(config):
                 events.append(Event("armed"))
                 is_stop_due = state.is_stop_due and bool(state.latch)
-                state = changed(_anew(state), arming=True, disarmed_by="", is_stop_due=is_stop_due, faults_read=None)
+                state = changed(anew(state), arming=True, disarmed_by="", is_stop_due=is_stop_due, faults_read=None)
         elif request is Request.DISARM and state.is_armed(config):
             is_ours = state.in_force is not None or state.held is not None  # the latter of a daemon that was killed
             state = _disarm(state, "a person", events)
@@ -43,25 +45,10 @@ def obey(state: ControlState, requests: Iterable[Request], config: ControlConfig
     return state
 
 
-def _anew(state: ControlState) -> ControlState:
-    """Before the next write the present angles are written, as at a start."""
-    return changed(
-        state,
-        stage=min(state.stage, Stage.REGISTERS_KNOWN),
-        last_extra=None,
-        axis_az=None,
-        axis_el=None,
-        was_followed=False,
-        axes=AxesWatch(),
-        watchdog=state.watchdog if state.watchdog is Watchdog.REFUSED else Watchdog.UNKNOWN,
-        is_stop_doubted=False,
-    )
-
-
 def _disarm(state: ControlState, by: str, events: list[Event]) -> ControlState:
     advice = "`acu-daemon arm` goes on"
     events.append(Event("disarmed", {"by": by, "advice": advice}, is_warning=True))
-    return changed(_anew(state), arming=False, disarmed_by=by, watchdog=state.watchdog)
+    return changed(anew(state), arming=False, disarmed_by=by, watchdog=state.watchdog)
 
 
 def respect_stop(before: ControlState, state: ControlState, config: ControlConfig, events: list[Event]) -> ControlState:
@@ -112,6 +99,7 @@ def note_held(state: ControlState, config: ControlConfig) -> ControlState:
     if status is None or state.track is TrackState.LINK_LOST or state.is_stop_doubted:
         return state
     is_held = state.track in ACTIVE if state.stage is Stage.READY else state.held is not None
+    is_held = is_held and not state.turn.is_stopping  # our own STOP is no other hand's
     held = Held(status.has_interlock_fault) if is_held and status.mode in STOPPED_FROM else None
     return state if held == state.held else changed(state, held=held)
 
@@ -171,6 +159,8 @@ def watch_antenna(state: ControlState, seen: Observation, config: ControlConfig,
     state = changed(state, axes=axes)
     if not problem:
         return state
+    if problem == AZIMUTH_AWAY and may_be_other_turn(state, config):
+        return doubt(state, config, events, problem)
     fields = {"problem": problem, "az_deg": state.az_deg, "el_deg": el_deg, "advice": "look, then `acu-daemon clear`"}
     events.append(Event("axis.latched", fields, is_warning=True))
     return changed(state, latch=problem, is_stop_due=True)

@@ -6,13 +6,23 @@ from acu_daemon.control.state import PassPlan
 from acu_daemon.model import AxisLimits, Pass, Site
 from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.propagator import Propagator
-from acu_daemon.pointing.wrap import choose_turn
+from acu_daemon.pointing.reach import OutOfReach, out_of_reach
+from acu_daemon.pointing.wrap import choose_turn, middle_deg
 
+COARSE_STEP_S, MOST_STEPS = 0.5, 20000
+ANY_ELEVATION = AxisLimits(-90.0, 180.0, 1.0, 1.0)
 STEP_S = 0.25  # fine enough to unwrap the azimuth of a pass 0.1 deg from the zenith
 
 
 def plan_pass(
-    propagator: Propagator, site: Site, coming: Pass, present_az_deg: float, azimuth: AxisLimits, now_tai_s: float
+    propagator: Propagator,
+    site: Site,
+    coming: Pass,
+    present_az_deg: float,
+    azimuth: AxisLimits,
+    now_tai_s: float,
+    *,
+    elevation: AxisLimits = ANY_ELEVATION,
 ) -> PassPlan:
     """Choose the turn that holds what is left of the pass, and the point where the antenna waits for it.
 
@@ -30,4 +40,17 @@ def plan_pass(
         start_az_deg=float(az_deg[0]) + turn.offset_deg,
         start_el_deg=float(look.el_deg[0]),
         note="" if turn.holds_path else turn.reason,
+        beyond=out_of_reach(tai_s, az_deg + turn.offset_deg, look.el_deg, azimuth, elevation),
     )
+
+
+def beyond_limits(
+    propagator: Propagator, site: Site, coming: Pass, azimuth: AxisLimits, elevation: AxisLimits
+) -> tuple[OutOfReach, ...]:
+    """When which axis cannot follow a pass, for an antenna that waits for it in the middle of its range."""
+    step_s = max(COARSE_STEP_S, coming.duration_s / MOST_STEPS)
+    tai_s = np.arange(coming.rise_tai_s, coming.set_tai_s, step_s)
+    look = look_at(propagator, tai_s, site)
+    az_deg = np.degrees(np.unwrap(np.radians(look.az_deg)))
+    turn = choose_turn(az_deg, look.el_deg, azimuth, middle_deg(azimuth))
+    return out_of_reach(tai_s, az_deg + turn.offset_deg, look.el_deg, azimuth, elevation)

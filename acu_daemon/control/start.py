@@ -5,6 +5,7 @@ Only then is a path written or a mode selected, and the register watchdog set.  
 write.  An ACU that refuses to have its parameters read or written is taken as it is, with a warning.
 """
 
+from acu_daemon.control.axis_watch import AxesWatch
 from acu_daemon.control.changed import changed
 from acu_daemon.control.state import ControlConfig, ControlState, Event, Exchange, Stage, Watchdog
 from acu_daemon.protocol.angles import LSB_DEG, clamp_deg
@@ -52,15 +53,34 @@ def next_command(state: ControlState, config: ControlConfig) -> Command | None:
     return None
 
 
+def anew(state: ControlState) -> ControlState:
+    """Before the next write the present angles are written, as at a start."""
+    return changed(
+        state,
+        stage=min(state.stage, Stage.REGISTERS_KNOWN),
+        last_extra=None,
+        axis_az=None,
+        axis_el=None,
+        was_followed=False,
+        axes=AxesWatch(),
+        watchdog=state.watchdog if state.watchdog is Watchdog.REFUSED else Watchdog.UNKNOWN,
+        is_stop_doubted=False,
+    )
+
+
 def watchdog_code(config: ControlConfig) -> int:
     """Code of the register watchdog's time."""
     return round(config.register_watchdog_s / WATCHDOG_LSB_S)
 
 
 def _present(state: ControlState, config: ControlConfig) -> tuple[float, float]:
+    """Where the ends of the range have one bearing, within a code of it that bearing: both ends are it, and reached."""
     el_deg = state.status.el_deg if state.status else 0.0
+    az_deg, ends_deg = state.az_deg, (config.azimuth.min_deg, config.azimuth.max_deg)
+    if abs(ends_deg[1] - ends_deg[0] - 360.0) < LSB_DEG:
+        az_deg = next((end for end in ends_deg if abs(az_deg - end) <= 1.01 * LSB_DEG), az_deg)
     return (
-        clamp_deg(state.az_deg, config.azimuth.min_deg, config.azimuth.max_deg),
+        clamp_deg(az_deg, *ends_deg),
         clamp_deg(el_deg, config.elevation.min_deg, config.elevation.max_deg),
     )
 

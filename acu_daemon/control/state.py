@@ -9,8 +9,10 @@ from acu_daemon.control.axis_watch import AxesWatch, Bounds
 from acu_daemon.control.encoder_watch import EncoderWatch
 from acu_daemon.control.lag import LagEstimate
 from acu_daemon.control.states import TrackState
+from acu_daemon.control.turn import TurnWatch
 from acu_daemon.model import AxisLimits, FitResult, Model, Prediction, Reading
 from acu_daemon.pointing.axis import AxisState
+from acu_daemon.pointing.reach import OutOfReach
 from acu_daemon.protocol.messages import Command, Identity, Nak, Reply, Status
 
 
@@ -150,6 +152,10 @@ class ControlState:
     gate_refusal_count: int = 0
     gate_clamped_count: int = 0  # followed writes that the gate held back to what the axes can do
     refusal: str = ""  # of the gate, so that only its change is logged
+    refused_input: str = ""  # what the tick was given and is not finite, so that only its change is logged
+    limited: str = ""  # which axis is held at its limit; for some seconds after it is not, so that noise tells nothing
+    limited_tai_s: float = -inf
+    gate_limited_count: int = 0  # writes that the gate held at a limit of an axis
     arming: bool | None = None  # as people or another hand at the ACU left it; None: as configured
     disarmed_by: str = ""
     latch: str = ""  # what an axis did wrong; nothing moves until a person clears it
@@ -162,6 +168,8 @@ class ControlState:
     watchdog_from_tai_s: float | None = None  # since when it is tried to set it
     axes: AxesWatch = AxesWatch()
     encoders: EncoderWatch = EncoderWatch()
+    turn: TurnWatch = TurnWatch()
+    goal_az_deg: float | None = None  # where the registers that are followed lead the azimuth, continuous
 
     def is_armed(self, config: ControlConfig) -> bool:
         """Whether anything may be written to the ACU."""
@@ -208,6 +216,7 @@ class PassPlan:
     start_az_deg: float  # continuous, encoder frame: where PREPOSITION goes
     start_el_deg: float
     note: str = ""  # why the turn is not a good one, when no turn holds the whole pass
+    beyond: tuple[OutOfReach, ...] = ()  # when which axis cannot follow
 
 
 @dataclass(frozen=True, slots=True)

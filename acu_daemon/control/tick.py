@@ -5,6 +5,7 @@ they take effect, and passes it through the safety gate.  control.state is its m
 """
 
 import math
+from dataclasses import replace
 
 from acu_daemon.control.absorb import absorb
 from acu_daemon.control.approach import way_to
@@ -12,7 +13,8 @@ from acu_daemon.control.axis_watch import AxesWatch
 from acu_daemon.control.causes import LINK_SILENCE_S, find_causes, path_point
 from acu_daemon.control.changed import changed
 from acu_daemon.control.fence import fence
-from acu_daemon.control.gate import Passed, gate
+from acu_daemon.control.finite import finite_only
+from acu_daemon.control.gate import Passed, gate, within_limits
 from acu_daemon.control.hands import (
     last_command,
     let_be,
@@ -26,6 +28,7 @@ from acu_daemon.control.hands import (
 )
 from acu_daemon.control.modes import wanted_mode_command
 from acu_daemon.control.path_offset import forget_other_pass, learn_of_signal
+from acu_daemon.control.relearn import watch_turn
 from acu_daemon.control.search import pointing
 from acu_daemon.control.searching import search
 from acu_daemon.control.start import next_command
@@ -50,6 +53,7 @@ EXTRA_REPEAT_S = 0.3  # a command gets this long to show in the status before it
 EXTRA_SETTLED_S = 0.7  # after that; a status that still contradicts itself means it
 FRESH_S = 0.2  # a place that is sure is where the antenna is for so long
 SETTLE_S = 1.0  # after a change of state the servo takes up the path: what it is short of then is no lag
+LIMITED_S = 2.0  # an axis that was not held at its limit for so long is within them again
 REGULAR_SHARE = 0.1  # of the period: of writes that come less regularly no lag is learned
 CALM_SHARE = 0.25  # of the drive's rate: above it a lag is what the drive cannot do, not what it does late
 
@@ -57,20 +61,38 @@ CALM_SHARE = 0.25  # of the drive's rate: above it a lag is what the drive canno
 def tick(
     state: ControlState, seen: Observation, sky: Sky, now_tai_s: float, config: ControlConfig
 ) -> tuple[ControlState, Orders]:
-    """Decide one tick.  now_tai_s: the moment the write starts, so that lateness is no pointing error."""
+    """Decide one tick.  now_tai_s: the moment the write starts, so that lateness is no pointing error.
+
+    What is not finite in seen and sky is left out, counted, and told once; without a finite time it only polls.
+    """
     events: list[Event] = []
+    seen, sky, refused = finite_only(seen, sky)
+    if state.offset is not None and not math.isfinite(state.offset.along_s + state.offset.across_deg):
+        state, refused = changed(state, offset=None), "offset"
+    state = _refuse(state, refused if math.isfinite(now_tai_s) else "time", events)
+    if not math.isfinite(now_tai_s):
+        return state, Orders(Poll(), None, tuple(events))
     before = state
     state = absorb(state, seen, sky, now_tai_s, config, events)
     state = obey(state, seen.requests, config, events)
     state = settle_doubt(respect_stop(before, state, config, events), seen, events)
     state = respect_interlock(state, seen, config, events)
     state = let_be(watch_antenna(state, seen, config, events))
+    state = watch_turn(state, seen, config, events)
     state = note_held(_walk(forget_other_pass(state, sky), seen, sky, now_tai_s, config, events), config)
     state = learn_of_signal(state, seen, sky, config, events)
     state = search(before, state, sky, now_tai_s, config, events)
     is_write_owed = bool(before.commands) and before.commands[-1] is None
     state, orders = _order(state, seen, sky, now_tai_s, config, events, is_write_owed=is_write_owed)
     return fence(state, orders, config)
+
+
+def _refuse(state: ControlState, refused: str, events: list[Event]) -> ControlState:
+    if refused and refused != state.refused_input:
+        events.append(Event("input.refused", {"input": refused, "reason": "not finite"}, is_warning=True))
+    if not refused and not state.refused_input:
+        return state
+    return changed(state, refused_input=refused, gate_refusal_count=state.gate_refusal_count + bool(refused))
 
 
 def _order(
@@ -111,6 +133,7 @@ def _may_write(state: ControlState, now_tai_s: float, config: ControlConfig) -> 
         and not state.latch
         and not state.is_stop_due
         and not state.is_stop_doubted
+        and not state.turn.is_stopping
         and state.stage is Stage.READY
         and state.status is not None
         and state.status.is_remote_enabled
@@ -181,7 +204,8 @@ def _extra(state: ControlState, now_tai_s: float, config: ControlConfig) -> Comm
     if wanted is None and now_tai_s - state.reading.tai_s > LINK_SILENCE_S:
         return None  # a status from before an outage: who knows where the antenna is now
     wanted = wanted or question(state) or next_command(state, config)
-    if wanted is None and state.is_armed(config) and _are_registers_fresh(state, now_tai_s):
+    may_select = state.is_armed(config) and not state.turn.is_stopping
+    if wanted is None and may_select and _are_registers_fresh(state, now_tai_s):
         wanted = wanted_mode_command(state, is_settled=now_tai_s - state.extra_after_tai_s > EXTRA_SETTLED_S)
     if wanted is None or (wanted == state.last_extra and now_tai_s < state.extra_after_tai_s):
         return None
@@ -214,7 +238,25 @@ def _write(
             fields = {"reason": passed.refusal, "az_deg": wanted.az_deg, "el_deg": wanted.el_deg}
             events.append(Event("gate.refused", fields, is_warning=True))
         state = changed(state, refusal=passed.refusal)
+    goal_deg = within_limits(wanted, state.az_deg, config)[0].az_deg if is_followed and wanted.is_finite else None
+    state = _tell_limits(changed(state, goal_az_deg=goal_deg), passed, wanted, now_tai_s, events)
     return _sent(state, passed, now_tai_s, config, is_followed=is_followed)
+
+
+def _tell_limits(
+    state: ControlState, passed: Passed, wanted: Pointing, now_tai_s: float, events: list[Event]
+) -> ControlState:
+    """Once for each edge; an axis that comes and goes at its limit is one that is held there."""
+    if passed.limited:
+        if passed.limited != state.limited:
+            fields = {"axis": passed.limited, "az_deg": wanted.az_deg, "el_deg": wanted.el_deg}
+            events.append(Event("gate.limited", fields, is_warning=True))
+        count = state.gate_limited_count + 1
+        return changed(state, limited=passed.limited, limited_tai_s=now_tai_s, gate_limited_count=count)
+    if state.limited and now_tai_s - state.limited_tai_s > LIMITED_S:
+        events.append(Event("gate.within_limits"))
+        return changed(state, limited="")
+    return state
 
 
 def _sent(
@@ -229,6 +271,7 @@ def _sent(
     since_s = now_tai_s - (state.last_write_tai_s or -math.inf)
     is_regular = abs(since_s - config.period_s) < REGULAR_SHARE * config.period_s
     is_free = is_calm and is_settled and is_regular and is_followed and state.was_followed and not passed.is_held_back
+    is_free = is_free and not passed.limited
     sent = Sent(az_deg, el_deg, is_free)
     state = changed(
         state,
@@ -245,6 +288,8 @@ def _sent(
 
 def _wanted(state: ControlState, sky: Sky, now_tai_s: float, config: ControlConfig, *, is_followed: bool) -> Pointing:
     """The direction the registers shall hold: for the middle of the time they are in force, led by the learned lag."""
+    if is_followed and state.turn.move_to_deg is not None:
+        return replace(_rest(state, is_followed=True), az_deg=state.turn.move_to_deg)
     lag_az_s, lag_el_s = state.lag_s(config) if is_followed else (0.0, 0.0)
     aim_tai_s = now_tai_s + config.effect_delay_s + config.period_s / 2
     az = _point(state, sky, aim_tai_s + lag_az_s, config, is_followed=is_followed)

@@ -5,7 +5,7 @@ under it.  Right of the motion is positive.  Unlike an offset in azimuth and ele
 orbit at every instant, one in this frame stays the same through the pass.
 """
 
-from math import asin, atan2, cos, degrees, hypot, radians, sin
+from math import asin, atan2, cos, degrees, hypot, isfinite, radians, sin
 
 from acu_daemon.control.state import ControlConfig
 from acu_daemon.model import Pointing, Prediction
@@ -35,7 +35,7 @@ def is_within(offset: tuple[float, float] | None, most: tuple[float, float]) -> 
 def beside(
     prediction: Prediction, tai_s: float, offset: tuple[float, float], *, pace: float = 0.0, follow: bool = False
 ) -> Pointing | None:
-    """The direction so many (seconds late, degrees right) beside the path; None outside the buffer.
+    """The direction so many (seconds late, degrees right) beside the path; None where the buffer has none.
 
     pace: seconds by which the first of them grows in a second; its motion is in the rates.
     """
@@ -54,7 +54,7 @@ def _place(
     prediction: Prediction, tai_s: float, along_s: float, across_deg: float, *, follow: bool
 ) -> tuple[float, float] | None:
     point = prediction.at(tai_s - along_s, follow=follow)
-    if point is None:
+    if point is None or not point.is_finite:
         return None
     east, up, speed = _motion(point)
     right, upward = across_deg * up / speed, -across_deg * east / speed
@@ -97,7 +97,8 @@ def offset_of(prediction: Prediction, tai_s: float, az_deg: float, el_deg: float
         across_deg += (right_deg * up - up_deg * east) / speed
         if speed >= SLOWEST_DEG_S:
             along_s -= (right_deg * east + up_deg * up) / speed**2
-    return (along_s, across_deg) if prediction.at(tai_s) is not None else None
+    is_known = prediction.at(tai_s) is not None and isfinite(along_s) and isfinite(across_deg)
+    return (along_s, across_deg) if is_known else None
 
 
 def _between(place: tuple[float, float], az_deg: float, el_deg: float) -> tuple[float, float]:

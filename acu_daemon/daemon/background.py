@@ -10,6 +10,7 @@ import structlog
 
 from acu_daemon.assist.gate import ABOVE_MAX_ELEVATION
 from acu_daemon.control.approach import lead_s
+from acu_daemon.control.finite import is_fit
 from acu_daemon.control.refit import GateVerdict, RefitReply, RefitRequest, RefitSetup, before_fit, predict_from
 from acu_daemon.control.state import ControlConfig, PassPlan
 from acu_daemon.control.states import ACTIVE, AUTOTRACKING, HOLDING, TrackState
@@ -163,6 +164,9 @@ class Background:
         except OrbitError as error:
             self._log.warning("prediction.failed", reason=str(error))
             return
+        if not prediction.is_finite:
+            self._log.warning("prediction.failed", reason="not finite: the last good one stays")
+            return
         self._area.sky = replace(sky, prediction=prediction)
 
     def _in_force(self, now_tai_s: float) -> tuple[FitResult | None, Model]:
@@ -238,6 +242,10 @@ class Background:
 
     def _take(self, reply: RefitReply, *, has_readings: bool) -> None:
         area = self._area
+        if not reply.prediction.is_finite or (reply.fit is not None and not is_fit(reply.fit)):
+            area.refit_failed_count += 1
+            self._log.warning("fit.refused", reason="not finite: the last good one stays")
+            return
         if reply.fit is not None and area.sky.fit is None:
             self._log.info(
                 "fit.first",
@@ -262,6 +270,7 @@ class Background:
         The fit process starts meanwhile.
         """
         self._area.sky = replace(self._area.sky, plan=plan)
+        self._has_asked = False
         now_tai_s = self._clock.tai_s()
         if self._is_near(now_tai_s):
             self._predict_here(now_tai_s)

@@ -43,6 +43,8 @@ def live_text(seen: Snapshot, beam_error_deg: float | None = None) -> str:
         f"buffer {seen.buffer_s:3.0f} s {seen.buffer_kind}{' (last pass)' if seen.model == Model.LAST_PASS else ''}",
         f"rejecting: {seen.rejecting}" if seen.rejecting else "",
         seen.encoder_problem,
+        seen.turn_alarm,
+        seen.limit_alarm,
         seen.clock_alarm,
         f"not written: {seen.files_alarm}" if seen.files_alarm else "",
     ]

@@ -59,6 +59,7 @@ class Outcome:
     refit_failed_count: int
     refusal_count: int
     clamped_count: int
+    limited_count: int
     connect_count: int
     lag_az_s: float
     lag_el_s: float
@@ -97,6 +98,7 @@ class Service:
         self._is_over = asyncio.Event()
         self._stop_reason = ""
         self._started_tai_s = math.inf
+        self._planned_turns = 0  # the turns that were learned anew before the plan was made
         self._log: Any = structlog.get_logger("pass")
         is_ours = job.state.is_armed(job.control) or job.state.held is not None
         is_stop_due = job.state.is_stop_due and is_ours and not job.control.is_shadow
@@ -166,7 +168,7 @@ class Service:
             self._is_over.set()
             return
         self._check_acu(now_tai_s - self._started_tai_s)
-        if sky.plan is None:
+        if sky.plan is None or self._area.state.turn.learned_count != self._planned_turns:
             self._plan(now_tai_s)
 
     def _check_acu(self, elapsed_s: float) -> None:
@@ -183,7 +185,17 @@ class Service:
         job, state = self._job, self._area.state
         if state.status is None:
             return
-        plan = plan_pass(job.refit.propagator, job.refit.site, job.coming, state.az_deg, job.control.azimuth, now_tai_s)
+        self._planned_turns = state.turn.learned_count
+        axes = job.control
+        plan = plan_pass(
+            job.refit.propagator,
+            job.refit.site,
+            job.coming,
+            state.az_deg,
+            axes.azimuth,
+            now_tai_s,
+            elevation=axes.elevation,
+        )
         self._log.info(
             "pass.planned",
             rise_in_s=round(plan.rise_tai_s - now_tai_s, 1),
@@ -194,6 +206,8 @@ class Service:
         )
         if plan.note:
             self._log.warning("pass.wrap", note=plan.note)
+        for one in plan.beyond:
+            self._log.warning("pass.beyond_limits", axis=one.axis, for_s=round(one.duration_s, 1), what=str(one))
         self._background.set_plan(plan)
 
     async def _safe_stop(self) -> bool:
@@ -247,6 +261,7 @@ class Service:
             refit_failed_count=self._area.refit_failed_count,
             refusal_count=state.gate_refusal_count,
             clamped_count=state.gate_clamped_count,
+            limited_count=state.gate_limited_count,
             connect_count=self._port.connect_count,
             lag_az_s=lag_az_s,
             lag_el_s=lag_el_s,

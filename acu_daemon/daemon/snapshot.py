@@ -56,7 +56,10 @@ class Snapshot:
     encoder_problem: str = ""
     clock_alarm: str = ""
     line_alarm: str = ""
+    turn_alarm: str = ""  # an azimuth that comes no nearer to its goal, a sector bit that is wrong
     files_alarm: str = ""  # what cannot be written: recording, state
+    limit_alarm: str = ""  # which axis is held at its limit: the satellite is beyond it
+    limited_count: int = 0  # writes that were held at a limit
     clamped_count: int = 0  # followed writes that the gate held back to what the axes can do
     search: str = ""  # what SEARCH has covered so far
     rejecting: str = ""  # why the newest readings are not fitted
@@ -109,6 +112,9 @@ def take_snapshot(
         attempt_count=port.attempt_count,
         refusal_count=state.gate_refusal_count,
         clamped_count=state.gate_clamped_count,
+        limit_alarm=state.limited,
+        limited_count=state.gate_limited_count,
+        turn_alarm=state.turn.alarm,
         arming=_arming(state, control),
         disarmed_by=state.disarmed_by,
         latch=state.latch,

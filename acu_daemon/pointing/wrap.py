@@ -4,7 +4,7 @@ Continuous azimuth counts on through north; the bearing is the same modulo 360. 
 """
 
 from dataclasses import dataclass
-from math import ceil, floor
+from math import ceil, floor, isfinite
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from acu_daemon.units import Array, wrap_180
 EITHER_WAY_ELEVATION_DEG = 85.0
 # The two ways differ in what happens above this; below it they have the same bearings.
 _COMMON_ELEVATION_DEG = 60.0
+ROUNDING_DEG = 1e-6
+END_SLACK_DEG = 1.0  # an encoder may read so far beyond a soft limit: noise, rounding, a drive that overshoots
+END_TIE_DEG = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +83,8 @@ def _judge(offset_deg: float, az_deg: Array, other_az_deg: Array, limits: AxisLi
 
 def nearest_turn(az_deg: float, near_deg: float, limits: AxisLimits) -> float | None:
     """Give a bearing as the continuous angle within the soft limits nearest to near_deg; None if no turn reaches it."""
+    if not isfinite(az_deg) or not isfinite(near_deg):
+        return None
     nearest = near_deg + wrap_180(az_deg - near_deg)
     first, last = ceil((limits.min_deg - nearest) / 360.0), floor((limits.max_deg - nearest) / 360.0)
     if first > last:
@@ -89,19 +94,66 @@ def nearest_turn(az_deg: float, near_deg: float, limits: AxisLimits) -> float | 
 
 def sector_for(az_deg: float, limits: AxisLimits) -> int:
     """Give the ACU's parameter S for a wanted continuous angle: 1 low half of the wrap, 2 high (ICD sections 4, 5)."""
-    return 2 if az_deg >= _middle_deg(limits) else 1
+    return 2 if az_deg >= middle_deg(limits) else 1
 
 
-def encoder_continuous(az_deg: float, is_sector_high: bool, limits: AxisLimits) -> float:
-    """Turn an encoder azimuth in [0, 360) and the sector bit n6.b3 into the continuous angle (ICD sections 3, 5).
+def turns_of(az_deg: float, limits: AxisLimits, slack_deg: float = ROUNDING_DEG) -> tuple[float, ...]:
+    """Every continuous angle of a bearing within the soft limits, or beyond them by slack_deg, lowest first."""
+    first = ceil((limits.min_deg - slack_deg - az_deg) / 360.0)
+    last = floor((limits.max_deg + slack_deg - az_deg) / 360.0)
+    return tuple(az_deg + 360.0 * turn for turn in range(first, last + 1))
 
-    Where rounding puts the bearing just outside its half, the angle nearest to that half is meant.
+
+def is_one_turn(limits: AxisLimits) -> bool:
+    """Whether the range has one turn for every bearing (its ends apart): there the sector bit means nothing."""
+    return limits.max_deg - limits.min_deg <= 360.0 + ROUNDING_DEG
+
+
+def encoder_continuous(
+    az_deg: float,
+    is_sector_high: bool,
+    limits: AxisLimits,
+    *,
+    near_deg: float | None = None,
+    end: int = 0,
+) -> float:
+    """Turn an encoder azimuth in [0, 360) into the continuous angle within the soft limits (ICD sections 3, 5).
+
+    end: +1 at the clockwise limit switch, -1 at the other, if the bearing is that of the end.  near_deg: where the axis
+    was a moment ago; no drive makes a turn in a moment, so it decides next.  Else the only turn inside the limits is
+    taken, whatever the sector bit n6.b3 says; with a range of more than 360 deg and two such turns the bit decides.
+    An angle that no turn reaches is the one nearest to the limits.
     """
-    middle = _middle_deg(limits)
+    near = turns_of(az_deg, limits, END_SLACK_DEG)
+    if not near:
+        around = turns_of(az_deg, limits, 360.0)
+        return min(around, key=lambda turn: max(limits.min_deg - turn, turn - limits.max_deg))
+    at_end_deg = {1: limits.max_deg, -1: limits.min_deg}.get(end)
+    at_end = [turn for turn in near if at_end_deg is not None and abs(turn - at_end_deg) <= END_SLACK_DEG]
+    if at_end:
+        return at_end[0]
+    if near_deg is not None:
+        return min(near, key=lambda turn: abs(turn - near_deg))
+    inside = turns_of(az_deg, limits) or near
+    if len(inside) == 1 or is_one_turn(limits):
+        return inside[0]
+    middle = middle_deg(limits)
     low, high = (middle, limits.max_deg) if is_sector_high else (limits.min_deg, middle)
-    centre = (low + high) / 2
-    return centre + wrap_180(az_deg - centre)
+    return min(inside, key=lambda turn: (max(low - turn, turn - high, 0.0), abs(turn - (low + high) / 2)))
 
 
-def _middle_deg(limits: AxisLimits) -> float:
+def nearest_end_deg(az_deg: float, near_deg: float, limits: AxisLimits) -> float:
+    """Give the end of the range nearest to a bearing that no turn reaches.
+
+    Where both are as near, within END_TIE_DEG: the one nearest to near_deg, so that no noise moves the axis from end
+    to end.
+    """
+    low_deg, high_deg = (abs(wrap_180(az_deg - end)) for end in (limits.min_deg, limits.max_deg))
+    if abs(low_deg - high_deg) < END_TIE_DEG:
+        return min((limits.min_deg, limits.max_deg), key=lambda end: abs(end - near_deg))
+    return limits.min_deg if low_deg < high_deg else limits.max_deg
+
+
+def middle_deg(limits: AxisLimits) -> float:
+    """What divides the halves of the sector bit."""
     return (limits.min_deg + limits.max_deg) / 2

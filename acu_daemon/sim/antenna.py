@@ -79,6 +79,8 @@ class Antenna:
         self._sky = parts.sky
         self._encoder = scenario.encoder
         self._encoder_random = Random(f"{parts.seed} encoder")
+        self._sector_bit = scenario.acu.sector_bit
+        self._sector_random = Random(f"{parts.seed} sector")
         self._losses = [(*loss.window_tai_s(parts.start_tai_s), loss) for loss in scenario.losses]
         self._autotrack = Autotrack(self.az, self.el)
         self._follow_az, self._follow_el = Follower(parts.azimuth), Follower(parts.elevation)
@@ -87,7 +89,11 @@ class Antenna:
 
     @property
     def is_sector_high(self) -> bool:
-        """Whether the azimuth is in the high half of its range."""
+        """What the sector bit shows: whether the azimuth is in the high half of its range, if it is driven."""
+        if self._sector_bit == "random":
+            return self._sector_random.random() < 0.5
+        if self._sector_bit != "driven":
+            return self._sector_bit == "stuck-1"
         return (self.az.angle_deg >= self._middle_az_deg) != self.trouble.is_turn_wrong
 
     @property

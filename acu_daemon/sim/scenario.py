@@ -3,7 +3,7 @@
 [sky]        along_track_s, delta_raan_deg      the satellite's orbit against the elements: late (+), node east (+)
 [encoder]    azimuth_bias_deg, elevation_bias_deg, noise_deg
 [receiver]   peak_agc_db, agc_noise_db, tracking_noise_deg
-[acu]        has_tilt, reply_latency_s, mode, azimuth_deg, elevation_deg
+[acu]        has_tilt, reply_latency_s, mode, azimuth_deg, elevation_deg, sector_bit
 [[loss]]     start_s + duration_s, or from_utc + to_utc; cause; depth_db for a fade
 [[fault]]    verb, and start_s, duration_s, count, probability, value, axis, on, seed (fault_verbs.py)
 """
@@ -19,6 +19,7 @@ from acu_daemon.sim.toml_table import read_table
 
 Cause = Literal["receiver", "silence-zone", "fade"]
 StartMode = Literal["standby", "manual", "remote", "stowed"]
+SectorBit = Literal["driven", "undriven", "random", "stuck-0", "stuck-1"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +60,7 @@ class AcuChoice:
     mode: StartMode = "standby"
     azimuth_deg: float = 0.0
     elevation_deg: float = 90.0
+    sector_bit: SectorBit = "driven"  # undriven reads 0 whatever the range; random: another value in every status
 
 
 @dataclass(frozen=True, slots=True)
