@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from made_oems import START, States, kvn, states, xml
+from made_oems import START, States, kvn, source, states, xml
 
 from acu_daemon.orbit.oem import parse_oem
 from acu_daemon.orbit.timescales import tai_from_utc
@@ -179,6 +179,97 @@ def test_a_bad_segment_loses_none_of_the_good_ones(write: Writer) -> None:
 @FORMS
 def test_one_state_is_not_enough(write: Writer) -> None:
     assert "1 states in the segment, at least 2 are needed" in reason(write(states(0.0)))
+
+
+def rows_of(text: str) -> list[str]:
+    return [line for line in text.split("\n") if line.startswith("2022-02-11T20:0")]
+
+
+def test_a_state_that_stands_twice_is_left_out_with_a_note() -> None:
+    text = kvn(SHORT)
+    for row in (rows_of(text)[0], rows_of(text)[2], rows_of(text)[-1]):
+        [segment], [] = parse_oem(text.replace(row, f"{row}\n{row}"), "x.oem")
+        assert np.array_equal(segment.tai_s, SHORT[0])
+        [note] = segment.notes
+        assert note.endswith("this state stands twice: the second is left out")
+    every = "\n".join(f"{line}\n{line}" if line in rows_of(text) else line for line in text.split("\n"))
+    [segment], [] = parse_oem(every, "x.oem")
+    assert np.array_equal(segment.tai_s, SHORT[0])
+    assert "6 states, this the first, stand twice" in segment.notes[0]
+
+
+def test_two_states_at_one_time_that_differ_are_refused() -> None:
+    text = kvn(SHORT)
+    first, second = rows_of(text)[1:3]
+    other = f"{first.split()[0]}  {'  '.join(second.split()[1:])}"
+    assert "does not: two states at one time, and they differ" in reason(text.replace(first, f"{first}\n{other}"))
+
+
+def test_a_block_that_goes_back_in_time_is_refused() -> None:
+    text = kvn(SHORT)
+    rows = rows_of(text)
+    assert "the times must rise, 2022-02-11T20:00:00.000000 does not" in reason(
+        text.replace("\n".join(rows), "\n".join([*rows, *rows]))
+    )
+    assert "the times must rise" in reason(text.replace("\n".join(rows), "\n".join(rows[3:] + rows[:3])))
+    assert "the times must rise" in reason(text.replace("\n".join(rows), "\n".join(reversed(rows))))
+
+
+def test_segments_out_of_order_that_do_not_overlap_are_read_in_their_own_right() -> None:
+    later = states(300.0, start_tai_s=START + 600.0)
+    both, [] = parse_oem(kvn(later, SHORT), "x.oem")
+    assert [one.start_tai_s for one in both] == [START + 600.0, START]
+    spans = source(kvn(later, SHORT)).spans_tai_s
+    assert spans == ((START, START + 300.0), (START + 600.0, START + 900.0))
+
+
+@pytest.mark.parametrize("count", range(1, 60, 3))
+def test_a_last_line_that_was_cut_costs_one_state_only(count: int) -> None:
+    whole = kvn(SHORT).split("\nCOVARIANCE_START")[0].rstrip("\n")
+    [segment], [] = parse_oem(whole[:-count], "x.oem")
+    assert segment.tai_s.size == SHORT[0].size - 1
+    assert segment.notes == (
+        f"x.oem, line {whole.count(chr(10)) + 1}: the file ends within this line: the state is left out",
+    )
+    [segment], [] = parse_oem(whole, "x.oem")
+    assert (segment.tai_s.size, segment.notes) == (SHORT[0].size, ())
+
+
+def test_a_last_line_that_was_cut_and_got_a_line_end_is_left_out_too() -> None:
+    whole = kvn(SHORT).split("\nCOVARIANCE_START")[0].rstrip("\n")
+    [segment], [] = parse_oem(whole[:-30] + "\n\n", "x.oem")
+    assert segment.tai_s.size == SHORT[0].size - 1
+
+
+def test_a_bad_line_before_the_last_one_is_refused() -> None:
+    text = kvn(SHORT)
+    assert "is not a time with position and velocity" in reason(text.replace(rows_of(text)[-2], "2022-02-11T20"))
+
+
+def test_an_xml_message_that_was_cut_has_the_states_before_the_cut() -> None:
+    text = xml(SHORT)
+    cut = text[: text.rindex("<stateVector>") + 60]
+    [segment], [] = parse_oem(cut, "x.oem")
+    assert segment.tai_s.size == SHORT[0].size - 1
+    assert "the file ends here: the states before it are used" in segment.notes[0]
+
+
+def test_unequal_steps_small_letters_and_exponents_of_fortran_are_read() -> None:
+    tai_s, r_m, v_m_s = states(600.0, 20.0)
+    kept = np.array([0, 1, 3, 5, 6, 9, 12, 14, 17, 20, 23, 26, 28, 30])
+    text = kvn((tai_s[kept], r_m[kept], v_m_s[kept]))
+    made = source(text).states_teme(tai_s)[0]
+    assert np.abs(made - r_m).max() < 5.0
+    number = f"{r_m[0, 0] / 1e3:.9f}"
+    fortran = f"{r_m[0, 0] / 1e6:.12f}D+03"
+    [segment], [] = parse_oem(text.replace(number, fortran).replace("META_START", "meta_start"), "x.oem")
+    assert np.abs(segment.r_m - r_m[kept]).max() < 1e-3
+
+
+@pytest.mark.parametrize("name", ["TEMEOFDATE", "TEME of date", "TEME_OF_DATE", "True of Date", "TOD"])
+def test_frames_of_date_are_known_by_their_long_names(name: str) -> None:
+    [segment], [] = parse_oem(kvn(SHORT, REF_FRAME=name), "x.oem")
+    assert segment.frame == ("TEME" if name.startswith("TEME") else "TOD")
 
 
 @pytest.mark.parametrize("trick", ["<!DOCTYPE oem [<!ENTITY a 'b'>]>", "<!DOCTYPE oem SYSTEM 'x'>"])
