@@ -1,6 +1,7 @@
 """Pictures of ground-track keeping."""
 
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 
 import matplotlib as mpl
@@ -9,8 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from acu_daemon.groundtrack.environment import EPOCH_TAI_S, STEP_S, Flux, even_steps
+from acu_daemon.groundtrack.history import History
+from acu_daemon.groundtrack.kinks import FoundManoeuvre
 from acu_daemon.groundtrack.simulate import Outcome
-from acu_daemon.units import DAY_S
+from acu_daemon.orbit.timescales import unix_from_tai
+from acu_daemon.units import DAY_S, Array
 
 TRUE, SEEN, LIMIT, SIZE = "#0b6e4f", "#9aa5b1", "#c8553d", "#3d7ea6"
 _SHOWN_STEPS = 20  # one in an hour
@@ -81,6 +85,26 @@ def plot_windows(path: Path, raw_m: Sequence[float], smoothed: dict[str, Sequenc
     axes.set_ylabel("D, m")
     axes.legend(fontsize=8)
     figure.savefig(path)
+
+
+def plot_history(path: Path, history: History, found: Sequence[FoundManoeuvre], title: str) -> None:
+    """D of a real satellite over time, and the manoeuvres found in it; writes a PNG."""
+    figure = _figure((10.0, 6.0))
+    cycle = history.reference.cycle
+    figure.suptitle(f"{title}: {cycle.revolutions} revolutions in {cycle.days} days", fontweight="bold")
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
+    above.plot(dates(history.tai_s), history.d_m, ".-", color=TRUE, linewidth=0.8, markersize=3)
+    above.set_ylabel("D, m (east positive, median 0)")
+    when = dates(np.array([one.tai_s for one in found]))
+    below.vlines(when, 0.0, [one.delta_a_m for one in found], color=SIZE, linewidth=1.4)
+    below.axhline(0.0, color=SEEN, linewidth=0.6)
+    below.set_ylabel("Δa found, m")
+    figure.savefig(path)
+
+
+def dates(tai_s: Array) -> list[datetime]:
+    """For an axis of time."""
+    return [datetime.fromtimestamp(unix_from_tai(float(one)), UTC) for one in tai_s]
 
 
 def _figure(size_in: tuple[float, float]) -> Figure:

@@ -1,0 +1,177 @@
+"""D of a real satellite from what is known of its orbit now and then, without a reference orbit.
+
+A phased satellite crosses the equator northwards at R longitudes, 360/R degrees apart.  Where it really crosses,
+folded into one such spacing and unwound, times the Earth's radius, is D (seed 003, eq 1) but for a constant; the
+median is taken out.  At the node the short-period terms of J2 in the node vanish, so no mean elements are needed.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import gcd
+from typing import NamedTuple
+
+import numpy as np
+
+from acu_daemon.errors import UsageError
+from acu_daemon.groundtrack.reference import Cycle, ReferenceOrbit, phased
+from acu_daemon.model import EarthOrientation
+from acu_daemon.orbit.brouwer import secular_rates
+from acu_daemon.orbit.frames import itrs_from_teme
+from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.orbit.timescales import utc_text
+from acu_daemon.units import DAY_S, EARTH_EQUATORIAL_RADIUS_M, MU_M3_S2, Array
+
+LONGEST_CYCLE_DAYS = 45
+KEPT_WITHIN_M, _SHARE_OF_SPACING = 20_000.0, 0.25  # a satellite that is kept stays within +- this, and this share
+_EARTH_RATE_RAD_S = 2.0 * np.pi / DAY_S * (1.0 + 1.0 / 365.2421897)
+_NODE_STEPS = 6
+_FARTHEST_A_M = 2_000.0  # of the mean orbit from that of its cycle; the elements' own bias is a few hundred
+LONGEST_GAP_DAYS = 15.0
+_NO_ORIENTATION = EarthOrientation()
+
+
+class Crossing(NamedTuple):
+    """A passage of the equator, northwards: when, and at which longitude east."""
+
+    tai_s: float
+    longitude_rad: float
+
+
+class MeanOrbit(NamedTuple):
+    """What the search for a cycle starts from: Brouwer's mean elements, good to some hundred metres."""
+
+    a_m: float
+    e: float
+    i_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """D over time, (N,) each; `reference` tells what a step of the semi-major axis does."""
+
+    reference: ReferenceOrbit
+    tai_s: Array
+    d_m: Array
+
+
+def crossing_near(propagator: Propagator, tai_s: float, revolution_s: float) -> Crossing:
+    """The ascending node nearest to a time.  Raises: OrbitError: no position there."""
+    times_s = tai_s + np.linspace(-0.75, 0.75, 61) * revolution_s
+    z = propagator.states_teme(times_s)[0][:, 2]
+    rising = np.flatnonzero((z[:-1] < 0.0) & (z[1:] >= 0.0))
+    k = min(rising, key=lambda one: abs(times_s[one] - tai_s))
+    at_s = float(times_s[k] - z[k] * (times_s[k + 1] - times_s[k]) / (z[k + 1] - z[k]))
+    for _ in range(_NODE_STEPS):
+        r_m, v_m_s = propagator.states_teme(np.array([at_s]))
+        at_s -= float(r_m[0, 2] / v_m_s[0, 2])
+    when = np.array([at_s])
+    r_m, _ = itrs_from_teme(*propagator.states_teme(when), when, _NO_ORIENTATION)
+    return Crossing(at_s, float(np.arctan2(r_m[0, 1], r_m[0, 0])))
+
+
+def revolutions_per_day(mean: MeanOrbit) -> float:
+    """Nodal revolutions in a nodal day, the P of which R/Q is to be."""
+    rates = secular_rates(mean.a_m, mean.e, mean.i_rad)
+    return float((rates.argp_rad_s + rates.mean_anomaly_rad_s) / (_EARTH_RATE_RAD_S - rates.raan_rad_s))
+
+
+def find_cycle(crossings: Sequence[Crossing], means: Sequence[MeanOrbit]) -> Cycle:
+    """The shortest repeat cycle about which D stays within a few kilometres.
+
+    Raises:  UsageError: there is none: the satellite is not phased, or what is known of it is too little.
+    """
+    per_day = float(np.median([revolutions_per_day(one) for one in means]))
+    tried = []
+    for days in range(1, LONGEST_CYCLE_DAYS + 1):
+        revolutions = round(per_day * days)
+        if gcd(revolutions, days) != 1:
+            continue
+        cycle = Cycle(revolutions, days)
+        d_m = unwound(cycle, crossings, _reference(cycle, means), means)
+        range_m = float(np.max(d_m) - np.min(d_m)) / 2.0
+        if range_m < min(KEPT_WITHIN_M, _SHARE_OF_SPACING * spacing_m(cycle)):
+            return cycle
+        tried.append((range_m, cycle))
+    range_m, nearest = min(tried)
+    raise UsageError(
+        f"no repeat cycle of up to {LONGEST_CYCLE_DAYS} days fits: the satellite makes {per_day:.5f} revolutions a "
+        f"day, and about the nearest cycle ({nearest.revolutions} in {nearest.days} days) its track wanders "
+        f"+-{range_m / 1e3:.0f} km; if it is phased, name the cycle with --cycle REVOLUTIONS/DAYS"
+    )
+
+
+def spacing_m(cycle: Cycle) -> float:
+    """Between neighbouring nodes of the whole cycle, along the equator."""
+    return 2.0 * np.pi * EARTH_EQUATORIAL_RADIUS_M / cycle.revolutions
+
+
+def history_of(
+    crossings: Sequence[Crossing], means: Sequence[MeanOrbit], cycle: Cycle | None = None
+) -> tuple[History, list[str]]:
+    """D at every crossing, its median taken out; and what has to be said about gaps.
+
+    Raises:  UsageError: fewer than three crossings; no cycle is found, or the one given does not fit.
+    """
+    if len(crossings) < 3:
+        raise UsageError(
+            f"{len(crossings)} element sets or passes are too few to see a drift in; at least 3 are needed"
+        )
+    chosen = cycle or find_cycle(crossings, means)
+    reference = _reference(chosen, means)
+    _refuse_other_cycle(reference, means)
+    d_m = unwound(chosen, crossings, reference, means)
+    tai_s = np.array([one.tai_s for one in crossings])
+    return History(reference, tai_s, d_m - np.median(d_m)), _gaps(chosen, tai_s)
+
+
+def unwound(
+    cycle: Cycle, crossings: Sequence[Crossing], reference: ReferenceOrbit, means: Sequence[MeanOrbit]
+) -> Array:
+    """D in metres (N,), zero at the first: of all that the folding allows, each is the nearest to what is expected."""
+    spacing = spacing_m(cycle)
+    folded = np.array([one.longitude_rad for one in crossings]) * EARTH_EQUATORIAL_RADIUS_M
+    tai_s = np.array([one.tai_s for one in crossings])
+    rates = np.array([reference.by_a.drift * (one.a_m - reference.a_m) for one in means])
+    rates -= np.median(rates)  # the elements' semi-major axis has a bias of its own
+    d_m = np.empty_like(folded)
+    d_m[0] = 0.0
+    for k in range(1, folded.size):
+        expected = d_m[k - 1] + 0.5 * (rates[k] + rates[k - 1]) * (tai_s[k] - tai_s[k - 1])
+        seen = folded[k] - folded[0]
+        d_m[k] = seen + spacing * round(float((expected - seen) / spacing))
+    return d_m
+
+
+def _reference(cycle: Cycle, means: Sequence[MeanOrbit]) -> ReferenceOrbit:
+    return phased(cycle, float(np.median([one.e for one in means])), float(np.median([one.i_rad for one in means])))
+
+
+def _refuse_other_cycle(reference: ReferenceOrbit, means: Sequence[MeanOrbit]) -> None:
+    off_m = float(np.median([one.a_m for one in means])) - reference.a_m
+    if abs(off_m) > _FARTHEST_A_M:
+        raise UsageError(
+            f"a cycle of {reference.cycle.revolutions} revolutions in {reference.cycle.days} days needs a semi-major "
+            f"axis of {reference.a_m / 1e3:.2f} km, this satellite is {off_m / 1e3:+.2f} km off: it is not its cycle"
+        )
+
+
+def _gaps(cycle: Cycle, tai_s: Array) -> list[str]:
+    """Where so long nothing is known that D may have moved on by a whole spacing unseen."""
+    return [
+        f"nothing is known from {utc_text(float(a), 0)} to {utc_text(float(b), 0)}, {(b - a) / DAY_S:.0f} days: D "
+        f"after it may be off by a multiple of {spacing_m(cycle) / 1e3:.0f} km, and manoeuvres in it are not seen"
+        for a, b in zip(tai_s[:-1], tai_s[1:], strict=True)
+        if b - a > LONGEST_GAP_DAYS * DAY_S
+    ]
+
+
+def mean_orbit_of(mean_motion_rad_s: float, e: float, i_rad: float) -> MeanOrbit:
+    """Brouwer's mean semi-major axis of an SGP4 (Kozai) mean motion, to some hundred metres.
+
+    Kozai's mean motion counts J2's part of the mean anomaly's rate, Brouwer's does not.
+    """
+    a_m = (MU_M3_S2 / mean_motion_rad_s**2) ** (1.0 / 3.0)
+    for _ in range(20):
+        rate = secular_rates(a_m, e, i_rad).mean_anomaly_rad_s
+        a_m += (rate - mean_motion_rad_s) / (1.5 * mean_motion_rad_s / a_m)
+    return MeanOrbit(a_m, e, i_rad)

@@ -1,0 +1,147 @@
+"""D and manoeuvres from element sets: made ones, whose truth is known; and files that nothing can be seen in."""
+
+import json
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import acu_daemon
+from conftest import DATA, needs_data
+from groundtrack_world import CRAFT, NODE_RAD, world
+from made_element_sets import element_set, noisy, omm_text
+
+from acu_daemon.groundtrack.environment import EPOCH_TAI_S, free_motion
+from acu_daemon.groundtrack.gps import Steering, TrueOrbit
+from acu_daemon.groundtrack.history import mean_orbit_of, revolutions_per_day
+from acu_daemon.groundtrack.reference import Cycle
+from acu_daemon.orbit.element_set import ElementSet
+from acu_daemon.orbit.timescales import tai_from_utc
+from acu_daemon.orbit.tle import parse_tle
+from acu_daemon.units import DAY_S
+
+DAYS = 90
+MANOEUVRES = Steering(np.array([11.8, 43.1, 70.2]) * DAY_S, np.array([168.0, 190.0, 196.0]))  # keep it in +-4 km
+NOISELESS_M, NOISY_M = 10.0, 130.0  # of D, rms
+SIZE_SHARE = 0.03
+
+
+@lru_cache
+def orbit() -> TrueOrbit:
+    return TrueOrbit(free_motion(CRAFT, DAYS + 1.0, world().flux), NODE_RAD)
+
+
+@lru_cache
+def made() -> list[ElementSet]:
+    """A set a day."""
+    times_s = (np.arange(DAYS) + 0.37) * DAY_S
+    return [element_set(orbit(), MANOEUVRES, float(t)) for t in times_s]
+
+
+def from_elements(path: Path, sets: list[ElementSet], *options: object) -> dict[str, object]:
+    path.write_text(omm_text(sets))
+    done = acu_daemon("groundtrack", "from-elements", path, "--json", *options)
+    assert done.code == 0, done.err
+    found: dict[str, object] = json.loads(done.out)
+    return found
+
+
+def error_m(found: dict[str, object]) -> float:
+    """Rms of D against the truth, but for a constant."""
+    points = found["d"]
+    seen = np.array([one["d_m"] for one in points])  # type: ignore[attr-defined]
+    times_s = np.array([tai_from_utc(one["utc"]) for one in points]) - EPOCH_TAI_S  # type: ignore[attr-defined]
+    return float(np.std(seen - orbit().drift_m(times_s, MANOEUVRES)))
+
+
+def test_d_of_made_sets_is_true_to_ten_metres_and_every_manoeuvre_is_found(tmp_path: Path) -> None:
+    found = from_elements(tmp_path / "made.json", made())
+    assert (found["cycle_revolutions"], found["cycle_days"]) == (373, 26)
+    assert error_m(found) < NOISELESS_M
+    seen = found["manoeuvres"]
+    assert len(seen) == 3  # type: ignore[arg-type]
+    for one, size_m in zip(seen, MANOEUVRES.delta_a_m, strict=True):  # type: ignore[call-overload]
+        assert one["delta_a_m"] == pytest.approx(size_m, rel=SIZE_SHARE)
+
+
+def test_noise_of_real_sets_leaves_d_and_the_large_manoeuvres_to_be_seen(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    found = from_elements(tmp_path / "made.json", [noisy(one, rng) for one in made()])
+    assert error_m(found) < NOISY_M
+    sizes = [one["delta_a_m"] for one in found["manoeuvres"]]  # type: ignore[attr-defined]
+    assert 2 <= len(sizes) <= 3
+    assert sizes[0] == pytest.approx(168.0, abs=25.0)
+
+
+def test_without_manoeuvres_none_are_found(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    quiet = [noisy(one, rng) for one in made()[13:42]]  # between two
+    assert from_elements(tmp_path / "made.json", quiet)["manoeuvres"] == []
+
+
+def test_a_table_and_files_are_written_for_people(tmp_path: Path) -> None:
+    path = tmp_path / "made.json"
+    path.write_text(omm_text(made()))
+    csv, png = tmp_path / "d.csv", tmp_path / "d.png"
+    done = acu_daemon("groundtrack", "from-elements", path, "--csv", csv, "--plot", png, "--cycle", "373/26")
+    assert done.code == 0
+    assert "3 manoeuvres found" in done.out
+    assert csv.read_text().startswith("utc,d_m\n2010-01-01T")
+    assert png.stat().st_size > 10_000
+
+
+def test_a_gap_is_told_and_nothing_is_invented_in_it(tmp_path: Path) -> None:
+    sets = made()
+    path = tmp_path / "made.json"
+    path.write_text(omm_text(sets[:21] + sets[40:]))
+    done = acu_daemon("groundtrack", "from-elements", path, "--json")
+    assert "warning: nothing is known from 2010-01-21" in done.err
+    assert len(json.loads(done.out)["d"]) == len(sets) - 19
+
+
+@pytest.mark.parametrize(
+    ("change", "options", "said"),
+    [
+        (lambda sets: sets[:2], (), "too few to see a drift in"),
+        (lambda sets: [replace(one, norad_id=90_001 + k % 2) for k, one in enumerate(sets)], (), "of 2 satellites"),
+        (lambda sets: sets, ("--norad-id", 5), "no element set of 5; it holds 90001"),
+        (lambda sets: sets, ("--cycle", "143/10"), "it is not its cycle"),
+        (lambda sets: sets, ("--cycle", "143"), "expected REVOLUTIONS/DAYS"),
+        (lambda sets: sets, ("--csv", "/nowhere/d.csv"), "there is no directory"),
+        (
+            lambda sets: [
+                replace(one, mean_motion_rad_s=one.mean_motion_rad_s * 1.00021, mean_anomaly_rad=0.7 * k % 6.28)
+                for k, one in enumerate(sets)
+            ],
+            (),
+            "no repeat cycle of up to 45 days fits",
+        ),
+    ],
+)
+def test_sets_in_which_no_ground_track_can_be_seen_are_refused(
+    tmp_path: Path, change: object, options: tuple[object, ...], said: str
+) -> None:
+    path = tmp_path / "made.json"
+    path.write_text(omm_text(change(made())))  # type: ignore[operator]
+    done = acu_daemon("groundtrack", "from-elements", path, *options)
+    assert done.code == 2
+    assert said in done.err
+
+
+def test_a_file_that_is_not_there_and_one_without_sets_are_told(tmp_path: Path) -> None:
+    assert acu_daemon("groundtrack", "from-elements", tmp_path / "none.tle").code == 2
+    (tmp_path / "empty.tle").write_text("")
+    done = acu_daemon("groundtrack", "from-elements", tmp_path / "empty.tle")
+    assert done.code == 2
+    assert "no element set" in done.err
+
+
+@needs_data
+def test_the_mean_orbit_of_real_sets_is_that_of_their_published_cycles() -> None:
+    sets, _ = parse_tle((DATA / "tle_sets" / "celestrak_resource_2026-05-30.txt").read_text(), "resource")
+    published = {"LANDSAT 8": Cycle(233, 16), "SENTINEL-2A": Cycle(143, 10), "SENTINEL-2B": Cycle(143, 10)}
+    for name, cycle in published.items():
+        one = next(one for one in sets if one.name.startswith(name))
+        mean = mean_orbit_of(one.mean_motion_rad_s, one.eccentricity, one.inclination_rad)
+        assert revolutions_per_day(mean) == pytest.approx(cycle.per_day, abs=2e-4)
