@@ -2,7 +2,7 @@
 
 import gzip
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ import pytest
 from command_line import acu_daemon
 from config_files import STATION, from_file, replaced, write
 from conftest import DATA, needs_data
+from flights import RISING_TAI_S, climb, demo_target, events_named, sky_of, state_at, the_pass, worst_error_deg
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -19,6 +20,7 @@ from acu_daemon.model import Correction, EarthOrientation
 from acu_daemon.orbit.element_set import ElementSet, rad_s_from_rev_day
 from acu_daemon.orbit.frames import itrs_from_teme
 from acu_daemon.orbit.kepler import osculating_from_state
+from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 from acu_daemon.orbit.tle import parse_tle
@@ -165,3 +167,43 @@ def test_no_satellite_of_a_real_list_decays_before_its_elements_are_too_old_but_
     sets, _ = parse_tle(gzip.decompress(packed.read_bytes()).decode(), packed.name)
     ends = [Sgp4Propagator(one).spans_tai_s[0][1] - one.epoch_tai_s for one in sets[::40]]
     assert np.mean(np.array(ends) > 30 * DAY_S) > 0.97
+
+
+@dataclass(frozen=True)
+class Ending:
+    """A source that knows nothing after an instant, as SGP4 of a satellite that decays then."""
+
+    source: Propagator
+    end_tai_s: float
+
+    kind = "tle"
+
+    @property
+    def epoch_tai_s(self) -> float:
+        return self.source.epoch_tai_s
+
+    @property
+    def spans_tai_s(self) -> tuple[tuple[float, float], ...]:
+        return ((-np.inf, self.end_tai_s),)
+
+    def states_teme(self, tai_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        if np.any(tai_s > self.end_tai_s + 120.0):
+            raise OrbitError("the satellite has decayed")
+        return self.source.states_teme(tai_s)
+
+    def corrected(self, correction: Correction) -> "Ending":
+        return Ending(self.source.corrected(correction), self.end_tai_s)
+
+
+def test_a_pass_that_the_decay_cuts_is_tracked_on_the_prediction_up_to_it() -> None:
+    target, known_s = demo_target(), 70.0
+    end_tai_s = RISING_TAI_S + known_s
+    elements = replace(target.elements, propagator=Ending(target.elements.propagator, end_tai_s))
+    cut = replace(target, elements=elements)
+    assert the_pass(cut, RISING_TAI_S).set_tai_s == end_tai_s
+    flight = climb(known_s + 60.0, cut, losses=[(30.0, 200.0)], sky=sky_of(target))
+    assert state_at(flight, end_tai_s - 0.5) == "HOLD/FITTED"
+    assert worst_error_deg(flight, RISING_TAI_S + 30.0, end_tai_s - 0.5) < 0.1
+    assert not events_named(flight, "fit.failed")
+    assert not events_named(flight, "prediction.failed")
+    assert flight.outcome.reason == "pass over"

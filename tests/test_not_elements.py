@@ -14,7 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_oems import kvn, states
 
+from acu_daemon.cli.options import coming_pass, load_target, nearest_to_pass
 from acu_daemon.orbit.contents import binary_kind, decoded, kind_of, what_else
+from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 from acu_daemon.orbit.tle import parse_tle
 
 CASES = SHARED / "cases" / "orbit"
@@ -179,6 +181,22 @@ ISS
     checked = acu_daemon("check", "--config", directory, "--at", "2024-03-09T18:00:00Z")
     assert "GO     sat: elements          epoch 2024-03-09T19:12:00Z" in checked.out
     assert "of 2 sets the one of 2024-03-09T19:12:00Z is used" in checked.out
+
+
+def test_the_set_nearest_to_the_pass_is_used_and_not_the_one_nearest_to_now(tmp_path: Path) -> None:
+    later = ISS.replace("24069.50", "24069.85").replace("9991", "9999")
+    directory = config(tmp_path, ISS + later)
+    station = STATION.replace("-15.53", "32.5").replace("-56.07", "-85.5")
+    (tmp_path / "station.toml").write_text(station)
+    checked = acu_daemon("check", "--config", directory, "--at", "2024-03-09T15:30:00Z")
+    assert "next pass         2024-03-09T" in checked.out
+    first = load_target(directory, "sat", tai_from_utc("2024-03-09T15:30:00Z"))
+    assert utc_text(first.elements.epoch_tai_s, 0) == "2024-03-09T12:00:00Z"
+    used = nearest_to_pass(directory, "sat", first, tai_from_utc("2024-03-09T15:30:00Z"))
+    rise_tai_s = coming_pass(first, tai_from_utc("2024-03-09T15:30:00Z")).rise_tai_s
+    assert rise_tai_s > tai_from_utc("2024-03-09T16:12:00Z")
+    assert utc_text(used.elements.epoch_tai_s, 0) == "2024-03-09T20:24:00Z"
+    assert "the one of 2024-03-09T20:24:00Z is used" in checked.out
 
 
 MISTAKES = {

@@ -18,6 +18,7 @@ from acu_daemon.cli.options import (
     Target,
     ending,
     load_target,
+    nearest_to_pass,
     not_covered,
     open_ends,
     parse_utc,
@@ -172,6 +173,7 @@ def clock_finding() -> Finding:
 def _satellite(config: Path, name: str, now_tai_s: float) -> Iterator[Finding]:
     try:
         target = load_target(config, name, now_tai_s, is_strict=False)
+        target = nearest_to_pass(config, name, target, now_tai_s, is_strict=False)
     except AcuDaemonError as error:
         yield Finding(NO_GO, f"{name}: files", str(error))
         return

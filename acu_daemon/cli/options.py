@@ -88,16 +88,33 @@ class Target:
     elements: LoadedElements
 
 
-def load_target(config: Path, name: str, now_tai_s: float, *, is_strict: bool = True) -> Target:
-    """Read both files and the elements.  With is_strict, elements that must not be used raise ElementsError."""
+def load_target(
+    config: Path, name: str, now_tai_s: float, *, is_strict: bool = True, at_tai_s: float | None = None
+) -> Target:
+    """Read both files and the elements.  With is_strict, elements that must not be used raise ElementsError.
+
+    at_tai_s: for when elements are wanted, where that is not now.
+    """
     for path in (config, config / "satellites", config / "station.toml", config / "satellites" / f"{name}.toml"):
         refuse_world_writable(path)
     base = load_station(config)
     satellite, station = load_satellite(config, name, base)
-    elements = load_elements(satellite, config / "satellites" / f"{name}.toml", now_tai_s, station.site.orientation)
+    path = config / "satellites" / f"{name}.toml"
+    elements = load_elements(satellite, path, now_tai_s, station.site.orientation, at_tai_s)
     if is_strict and elements.errors:
         raise ElementsError("\n".join(elements.errors))
     return Target(station, satellite, elements)
+
+
+def nearest_to_pass(config: Path, name: str, target: Target, now_tai_s: float, *, is_strict: bool = True) -> Target:
+    """The target with the set of its file that is nearest to the coming pass, where that is not the nearest to now."""
+    if not target.elements.choice or target.elements.errors:
+        return target
+    found = _passes_until(target, now_tai_s, now_tai_s + NEXT_PASS_DAYS * DAY_S)
+    rise_tai_s = next((one.rise_tai_s for one in found if one.set_tai_s > now_tai_s), now_tai_s)
+    if rise_tai_s <= now_tai_s:
+        return target
+    return load_target(config, name, now_tai_s, is_strict=is_strict, at_tai_s=rise_tai_s)
 
 
 def coming_pass(target: Target, now_tai_s: float) -> Pass:

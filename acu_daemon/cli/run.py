@@ -31,6 +31,7 @@ from acu_daemon.cli.options import (
     ending,
     load_target,
     make_clock,
+    nearest_to_pass,
 )
 from acu_daemon.config import control_config, estimator_settings
 from acu_daemon.control.refit import RefitSetup
@@ -112,6 +113,7 @@ def command(
     check_duration(duration)
     clock = make_clock(at, at_monotonic)
     target = load_target(config, satellite, clock.tai_s())
+    target = nearest_to_pass(config, satellite, target, clock.tai_s())
     coming = coming_pass(target, clock.tai_s())
     link = make_link(target.station.acu.url)
     check_rate(link, target.station.acu.period_s, target.station.acu.device_delay_s)

@@ -42,19 +42,24 @@ class LoadedElements:
 
 
 def load_elements(
-    satellite: SatelliteFile, toml_path: Path, now_tai_s: float, orientation: EarthOrientation = _NO_ORIENTATION
+    satellite: SatelliteFile,
+    toml_path: Path,
+    now_tai_s: float,
+    orientation: EarthOrientation = _NO_ORIENTATION,
+    at_tai_s: float | None = None,
 ) -> LoadedElements:
     """Make the satellite's propagator.
 
     Of a file that is being written just now half may be there: what is wrong with it is looked at again for a moment.
-    orientation: the station's; an Earth-fixed ephemeris needs it.
+    orientation: the station's; an Earth-fixed ephemeris needs it.  at_tai_s: for when elements are wanted, such as the
+    pass, where that is not now: of several sets the nearest to it is taken.
     Raises: ElementsError: names file, line and reason.
     """
     end_s = time.monotonic() + RECENT_S
     while True:
         is_last = time.monotonic() > end_s or not _is_recent(satellite, toml_path)
         try:
-            loaded = _load(satellite, toml_path, now_tai_s, orientation)
+            loaded = _load(satellite, toml_path, now_tai_s, orientation, now_tai_s if at_tai_s is None else at_tai_s)
         except ElementsError:
             if is_last:
                 raise
@@ -76,7 +81,9 @@ def _is_recent(satellite: SatelliteFile, toml_path: Path) -> bool:
         return False
 
 
-def _load(satellite: SatelliteFile, toml_path: Path, now_tai_s: float, orientation: EarthOrientation) -> LoadedElements:
+def _load(
+    satellite: SatelliteFile, toml_path: Path, now_tai_s: float, orientation: EarthOrientation, at_tai_s: float
+) -> LoadedElements:
     section = satellite.elements
     if isinstance(section, BrouwerSection):
         return _from_brouwer(satellite, section, toml_path, now_tai_s)
@@ -87,7 +94,7 @@ def _load(satellite: SatelliteFile, toml_path: Path, now_tai_s: float, orientati
     loaded = (
         _from_ephemeris(satellite, section, path, text, now_tai_s, orientation)
         if kind == "oem"
-        else _from_sets(satellite, section, path, text, now_tai_s, _PARSERS[kind])
+        else _from_sets(satellite, section, path, text, now_tai_s, at_tai_s, _PARSERS[kind])
     )
     if kind == section.kind:
         return loaded
@@ -119,6 +126,7 @@ def _from_sets(
     path: Path,
     text: str,
     now_tai_s: float,
+    at_tai_s: float,
     parse: Callable[[str, str], tuple[list[ElementSet], list[Problem]]],
 ) -> LoadedElements:
     sets, problems = parse(text, str(path))
@@ -128,7 +136,7 @@ def _from_sets(
     if not sets:
         raise ElementsError("\n".join(_few([*own, *_others(lost, own)] or problems)))
     try:
-        selected = select_elements(sets, wanted.norad_id, wanted.name, now_tai_s, is_whole=not (lost or own))
+        selected = select_elements(sets, wanted.norad_id, wanted.name, at_tai_s, is_whole=not (lost or own))
     except ElementsError as error:
         raise ElementsError("\n".join([*_few(own), str(error), *_few(_others(lost, own))])) from None
     chosen = selected.elements
