@@ -7,11 +7,13 @@ from flights import (
     DEMO_ANTENNA,
     DEMO_TAI_S,
     RISING_TAI_S,
+    SCD_HIGH_TAI_S,
     Flight,
     demo_target,
     events_named,
     flight_of,
     rows_between,
+    scd_target,
     sky_of,
     state_at,
     the_pass,
@@ -23,6 +25,7 @@ from acu_daemon.sim.scenario import AcuChoice
 from acu_daemon.units import wrap_180
 
 AXIS_DEG = 0.1
+AZ_DEG = 0.2
 HELD_DEG = 0.3  # of the prediction, from 20 s of readings, a minute or two later
 
 
@@ -55,6 +58,30 @@ def test_an_elevation_below_the_satellite_is_held_at_its_limit_and_the_azimuth_f
         assert row.encoder_el_deg == pytest.approx(58.0, abs=AXIS_DEG)
     assert flight.outcome.limited_count > 100
     assert flight.outcome.refusal_count == 0
+
+
+@cache
+def scd_below_66_deg() -> tuple[Flight, Target]:
+    """SCD-1 culminates 1.4 deg above this elevation limit."""
+    target = with_elevation(scd_target(SCD_HIGH_TAI_S), max_deg=66.0)
+    begin_tai_s = the_pass(target, SCD_HIGH_TAI_S).culmination_tai_s - 40.0
+    truth = sky_of(target).direction(begin_tai_s)
+    antenna = AcuChoice(azimuth_deg=truth[0], elevation_deg=truth[1])
+    return flight_of(target, begin_tai_s, 80.0, antenna=antenna), target
+
+
+def test_a_satellite_above_the_elevation_limit_for_50_s_is_followed_in_azimuth_and_taken_again_below_it() -> None:
+    flight, target = scd_below_66_deg()
+    sky = sky_of(target)
+    beyond = [(row, sky.direction(row.tai_s)) for row in flight.rows if sky.direction(row.tai_s)[1] > 66.0]
+    assert beyond[-1][0].tai_s - beyond[0][0].tai_s == pytest.approx(49.6, abs=0.6)
+    assert max(truth[1] for _, truth in beyond) == pytest.approx(67.4, abs=0.05)
+    assert max(abs(wrap_180(row.encoder_az_deg - truth[0])) for row, truth in beyond) < AZ_DEG
+    assert max(abs(row.encoder_el_deg - min(truth[1], 66.0)) for row, truth in beyond) < AXIS_DEG
+    assert worst_error_deg(flight, flight.rows[-1].tai_s - 5.0, flight.rows[-1].tai_s) < AXIS_DEG
+    [told] = [one for one in events_named(flight, "pass.beyond_limits") if one["axis"] == "elevation"]
+    assert told["for_s"] == pytest.approx(49.6, abs=0.6)
+    assert told["what"].startswith("elevation above 66 deg for 50 s, 1989-02-01T")
 
 
 def test_an_axis_at_its_limit_is_told_once_and_shown_while_it_lasts() -> None:

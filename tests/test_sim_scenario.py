@@ -82,6 +82,7 @@ LOSS = '[[loss]]\ncause = "receiver"\n'
         ("[sky]\nalong_track_s = true\n", "expected a number"),
         ("[encoder]\nnoise_deg = -1\n", r"\[encoder\] noise_deg = -1: expected 0 or more"),
         ("[acu]\nhas_tilt = 1\n", r"has_tilt = 1: expected true or false"),
+        ("[acu]\nsector_bit = 0\n", r"sector_bit = 0: expected "),
         ('[acu]\nmode = "asleep"\n', "mode = 'asleep': expected one of 'standby', 'manual', 'remote', 'stowed'"),
         ("[[loss]]\nstart_s = 1\nduration_s = 1\n", r"\[loss 1\] cause is missing"),
         (LOSS + "start_s = 1\n", "loss 1: expected either start_s and duration_s"),

@@ -16,7 +16,7 @@ from acu_daemon.control.changed import changed
 from acu_daemon.control.start import anew
 from acu_daemon.control.state import ControlConfig, ControlState, Event, Observation, Stage
 from acu_daemon.control.states import ACTIVE, TrackState
-from acu_daemon.control.turn import Phase, at_rest, is_pulled_round, other_turn, watch_goal, watch_pull
+from acu_daemon.control.turn import Phase, at_rest, half_text, is_pulled_round, other_turn, watch_goal, watch_pull
 from acu_daemon.protocol.messages import AcuMode, Status
 
 STEP_DEG = 5.0
@@ -42,6 +42,7 @@ def doubt(state: ControlState, config: ControlConfig, events: list[Event], why: 
         "az_deg": state.az_deg,
         "el_deg": el_deg,
         "goal_deg": state.goal_az_deg,
+        "turn": half_text(state.az_deg, config.azimuth),
         "other_turn_deg": other_deg,
         "sector_bit": int(state.status.is_sector_high) if state.status else None,
         "action": f"stopped; then moved by {STEP_DEG:g} deg on the other turn, away from the nearer stop",

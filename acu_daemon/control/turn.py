@@ -164,10 +164,14 @@ def watch_goal(
     is_late = tai_s - watch.begun_tai_s > PATIENCE_S + drive_s(watch.way_deg, limits)
     if not (is_standing or is_late) or watch.problem:
         return watch, is_standing
-    half = "high" if az_deg >= middle_deg(limits) else "low"
-    turn = "" if is_one_turn(limits) else f", on the {half} half of the range as believed"
+    turn = "" if is_one_turn(limits) else f", {half_text(az_deg, limits)}"
     problem = f"azimuth late: at {az_deg:.1f} deg{turn}, its goal at {goal_deg:.1f} deg"
     return changed(watch, problem=problem), is_standing
+
+
+def half_text(az_deg: float, limits: AxisLimits) -> str:
+    """Which turn is believed, for people."""
+    return f"on the {'high' if az_deg >= middle_deg(limits) else 'low'} half of the range as believed"
 
 
 def drive_s(way_deg: float, limits: AxisLimits) -> float:

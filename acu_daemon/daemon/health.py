@@ -44,6 +44,7 @@ def status_line(seen: Snapshot) -> str:
         parts.append(f"az {seen.az_deg:.2f} el {seen.el_deg:.2f} deg")
     if seen.fit_age_s is not None:
         parts.append(f"fit {seen.fit_age_s:.0f} s old")
+    parts += [alarm for alarm in (seen.turn_alarm, seen.limit_alarm) if alarm]
     if seen.files_alarm:
         parts.append(f"not written: {seen.files_alarm}")
     if not seen.is_link_up:
