@@ -48,7 +48,7 @@ def under_a_ceiling() -> Flight:
     return flight_of(target, DEMO_TAI_S - 40.0, 60.0, antenna=antenna, losses=[(25.0, 90.0)])
 
 
-def test_an_elevation_below_the_satellite_is_held_at_its_limit_and_the_azimuth_follows() -> None:
+def test_p5_an_elevation_below_the_satellite_is_held_at_its_limit_and_the_azimuth_follows() -> None:
     flight, sky = under_a_ceiling(), sky_of(demo_target())
     beyond = [row for row in flight.rows if (sky.direction(row.tai_s) or (0, 0, 0))[1] > 58.5]
     assert len(beyond) > 100
@@ -70,7 +70,7 @@ def scd_below_66_deg() -> tuple[Flight, Target]:
     return flight_of(target, begin_tai_s, 80.0, antenna=antenna), target
 
 
-def test_a_satellite_above_the_elevation_limit_for_50_s_is_followed_in_azimuth_and_taken_again_below_it() -> None:
+def test_p5_a_satellite_above_the_elevation_limit_for_50_s_is_followed_in_azimuth_and_taken_again_below_it() -> None:
     flight, target = scd_below_66_deg()
     sky = sky_of(target)
     beyond = [(row, sky.direction(row.tai_s)) for row in flight.rows if sky.direction(row.tai_s)[1] > 66.0]
