@@ -6,6 +6,7 @@ Unknown keys, wrong units and impossible values stop the start with file, key, v
 import errno
 import os
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -22,12 +23,13 @@ from acu_daemon.errors import ConfigError
 HALF_SERVO_TICK_S = 0.010  # ICD section 6: a command waits for half a 50 Hz servo tick on average
 
 File = TypeVar("File", bound=Section)
+_NONE: Mapping[str, type[Section]] = {}
 
 
 def load_station(directory: Path) -> StationFile:
     """Read DIR/station.toml.  ConfigError: names file, key, value and what was expected."""
     path = directory / "station.toml"
-    return _parse(StationFile, path, _read(path))
+    return parse(StationFile, path, read_toml(path))
 
 
 def satellite_names(directory: Path) -> list[str]:
@@ -48,7 +50,7 @@ def load_satellite(directory: Path, name: str, station: StationFile) -> tuple[Sa
     if not _exists(path):
         known = ", ".join(satellite_names(directory)) or "none"
         raise ConfigError(f"{path}: no such file; satellites in {directory}: {known}")
-    satellite = _parse(SatelliteFile, path, _read(path))
+    satellite = parse(SatelliteFile, path, read_toml(path))
     sections: dict[str, Section] = {
         "receiver": station.receiver,
         "readings": station.readings,
@@ -56,7 +58,7 @@ def load_satellite(directory: Path, name: str, station: StationFile) -> tuple[Sa
     }
     for key, section in sections.items():
         override: dict[str, Any] = getattr(satellite, key)
-        sections[key] = _parse(type(section), path, section.model_dump() | override, under=key)
+        sections[key] = parse(type(section), path, section.model_dump() | override, under=key)
     return satellite, station.model_copy(update=sections)
 
 
@@ -68,11 +70,12 @@ def _exists(path: Path) -> bool:
         return error.errno != errno.ENAMETOOLONG
 
 
-def _read(path: Path) -> dict[str, Any]:
+def read_toml(path: Path, must_hold: str = "the station's [station] and [acu] tables") -> dict[str, Any]:
+    """Read a TOML file.  ConfigError: names the file and what is wrong with it."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
-        raise ConfigError(f"{path}: no such file; it must hold the station's [station] and [acu] tables") from None
+        raise ConfigError(f"{path}: no such file; it must hold {must_hold}") from None
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
@@ -81,11 +84,18 @@ def _read(path: Path) -> dict[str, Any]:
         raise ConfigError(f"{path}: not TOML: {error}") from None
 
 
-def _parse(model: type[File], path: Path, values: dict[str, Any], under: str = "") -> File:
+def parse(
+    model: type[File], path: Path, values: dict[str, Any], under: str = "", also: Mapping[str, type[Section]] = _NONE
+) -> File:
+    """Make a table of a file's values.  ConfigError: names file, key, value and what was expected.
+
+    also: other files that a misplaced key may belong to.
+    """
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        known = {"station.toml": _keys(StationFile), "the satellite's file": _keys(SatelliteFile)}
+        files = also or {"station.toml": StationFile, "the satellite's file": SatelliteFile}
+        known = {name: _keys(kind) for name, kind in files.items()}
         problems = [f"{path}: {in_words(dict(item), under, known)}" for item in error.errors()]
         raise ConfigError("\n".join(problems)) from None
 

@@ -51,6 +51,19 @@ GROUPS: dict[str, Group] = {
             "from-elements": ("groundtrack_elements", "command"),
         },
     ),
+    "onboard": Group(
+        """
+        The antenna on the satellite: tracking profiles of a steerable downlink antenna over a pass (seed 004).
+
+        A pass is described in a PASS.toml (docs/onboard.md shows one).  `profile` makes its profile and writes the
+        tracking-parameter file, `check` reads such a file back, `scenarios` compares the methods on made passes.
+        """,
+        {
+            "profile": ("onboard", "profile"),
+            "check": ("onboard", "check"),
+            "scenarios": ("onboard", "scenarios"),
+        },
+    ),
 }
 HELP = """
     Assisted tracking: keeps an antenna on a low-orbit satellite when its signal is lost.

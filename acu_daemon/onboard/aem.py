@@ -16,7 +16,6 @@ from acu_daemon.onboard.frames import turn
 from acu_daemon.orbit.element_set import Problem, place
 from acu_daemon.orbit.oem import SUPPORTED_FRAMES, Frame, epoch_tai_s, frame_named, numbers, required, time_system
 from acu_daemon.orbit.oem_text import BadSegmentError, Layout, RawSegment, read_segments
-from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.units import DEG, Array
 
 ReferenceFrame = Frame | Literal["LVLH", "RTN"]
@@ -31,6 +30,7 @@ _SEQUENCE = re.compile(r"[XYZ]{3}")
 _LEAST_STATES = 4  # a cubic
 TURN_PER_GAP_DEG = 2.0  # what the body may turn between two states
 SHORT_S, LONGEST_S = 2.0, 30.0  # a gap this short always passes, one longer than that never does
+_MOST_TURN_DEG = 45.0  # between two states, however short the step
 _NEIGHBOURS = 3  # intervals on either side whose rates a gap is judged by
 
 
@@ -53,6 +53,17 @@ AEM = Layout(
 
 
 @dataclass(frozen=True, slots=True)
+class Gap:
+    """Two neighbouring states too far apart for the turning between them."""
+
+    start_tai_s: float
+    end_tai_s: float
+    fastest_deg_s: float
+    allowed_s: float
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
 class AemSegment:
     """Attitudes of one body at rising times: rotations from the reference frame to the body."""
 
@@ -63,6 +74,7 @@ class AemSegment:
     end_tai_s: float
     tai_s: Array = field(repr=False)  # (N,)
     quaternion: Array = field(repr=False)  # (N, 4): three of the axis, then the scalar; of steady sign
+    gaps: tuple[Gap, ...]
     file: str
     line: int
 
@@ -113,7 +125,6 @@ def _segment(raw: RawSegment, file: str, body: str | None, *, is_xml: bool) -> A
     quaternion = _quaternions(raw, kind, is_xml=is_xml)
     if not is_forward:
         quaternion = quaternion * [-1.0, -1.0, -1.0, 1.0]
-    _refuse_gaps(raw, tai_s, quaternion)
     return AemSegment(
         name=raw.fields.get("OBJECT_NAME", "") or "(no OBJECT_NAME)",
         reference=reference,
@@ -122,6 +133,7 @@ def _segment(raw: RawSegment, file: str, body: str | None, *, is_xml: bool) -> A
         end_tai_s=float(tai_s[-1]),
         tai_s=tai_s,
         quaternion=quaternion,
+        gaps=_gaps(raw, tai_s, quaternion),
         file=file,
         line=raw.line,
     )
@@ -202,19 +214,15 @@ def matrices(quaternion: Array) -> Array:
     return matrix
 
 
-def _refuse_gaps(raw: RawSegment, tai_s: Array, quaternion: Array) -> None:
+def _gaps(raw: RawSegment, tai_s: Array, quaternion: Array) -> tuple[Gap, ...]:
     """Between two states the body may turn by 2 deg, as fast as it turns there or in the intervals around."""
     step_s = np.diff(tai_s)
     turn_deg = 2.0 * np.arccos(np.minimum(1.0, np.abs(np.sum(quaternion[1:] * quaternion[:-1], axis=1)))) / DEG
     rates = np.pad(turn_deg / step_s, _NEIGHBOURS, mode="edge")
     fastest = np.max([rates[k : k + step_s.size] for k in range(2 * _NEIGHBOURS + 1)], axis=0)
     allowed_s = np.clip(TURN_PER_GAP_DEG / np.maximum(fastest, 1e-9), SHORT_S, LONGEST_S)
-    bad = np.flatnonzero((step_s > allowed_s + 1e-6) | (turn_deg > 45.0))
-    if bad.size:
-        k = int(bad[0])
-        raise BadSegmentError(
-            f"a gap of {step_s[k]:.1f} s from {utc_text(float(tai_s[k]))} on, where the attitude turns by up to "
-            f"{fastest[k]:.2f} deg/s: it cannot be interpolated over more than {allowed_s[k]:.1f} s there; get a file "
-            "without the gap or with shorter steps",
-            raw.states[k + 1][0],
-        )
+    bad = np.flatnonzero((step_s > allowed_s + 1e-6) | (turn_deg > _MOST_TURN_DEG))
+    return tuple(
+        Gap(float(tai_s[k]), float(tai_s[k + 1]), float(fastest[k]), float(allowed_s[k]), raw.states[k + 1][0])
+        for k in bad.tolist()
+    )

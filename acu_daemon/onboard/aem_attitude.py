@@ -8,6 +8,7 @@ from acu_daemon.errors import AttitudeError
 from acu_daemon.model import EarthOrientation
 from acu_daemon.onboard.aem import AemSegment, ReferenceFrame, matrices
 from acu_daemon.orbit.celestial import teme_from_eme2000, teme_from_gcrf, teme_from_tod
+from acu_daemon.orbit.element_set import place
 from acu_daemon.orbit.frames import teme_from_itrs
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.units import Array
@@ -36,6 +37,7 @@ class AemAttitude:
         for one in self._segments:
             is_in = (tai_s >= one.start_tai_s - _EDGE_S) & (tai_s <= one.end_tai_s + _EDGE_S)
             if is_in.any():
+                _refuse_gap(one, tai_s)
                 body = matrices(interpolated(one.tai_s, one.quaternion, tai_s[is_in]))
                 rotations[is_in] = body @ self._from_lvlh(one.reference, tai_s[is_in], lvlh_from_teme[is_in])
         outside = np.flatnonzero(np.isnan(rotations[:, 0, 0]))
@@ -62,6 +64,19 @@ class AemAttitude:
             earth = _FROM_INERTIAL[reference](tai_s)
         turned: Array = earth.transpose(0, 2, 1) @ teme_from_lvlh
         return turned
+
+
+def _refuse_gap(segment: AemSegment, tai_s: Array) -> None:
+    """AttitudeError: one of the times lies in a gap."""
+    for gap in segment.gaps:
+        if ((tai_s > gap.start_tai_s) & (tai_s < gap.end_tai_s)).any():
+            lasts_s = gap.end_tai_s - gap.start_tai_s
+            raise AttitudeError(
+                f"{place(segment.file, gap.line, None)}: a gap of {lasts_s:.1f} s in the attitude from "
+                f"{utc_text(gap.start_tai_s)} on, where it turns by up to {gap.fastest_deg_s:.2f} deg/s: it cannot be "
+                f"interpolated over more than {gap.allowed_s:.1f} s there; get a file without the gap or with shorter "
+                "steps"
+            )
 
 
 def interpolated(tai_s: Array, quaternion: Array, at_tai_s: Array) -> Array:

@@ -67,6 +67,7 @@ class AttitudePlan:
     """Holds in order, slews between; before the first and after the last one these go on."""
 
     holds: tuple[Hold, ...]
+    imaging_tai_s: tuple[tuple[float, float], ...] = ()  # when the camera works
 
     def angles_deg(self, tai_s: Array) -> Array:
         """Roll, pitch and yaw (N, 3)."""
@@ -80,11 +81,6 @@ class AttitudePlan:
     def body_from_lvlh(self, tai_s: Array, lvlh_from_teme: Array) -> Array:
         """Rotations (N, 3, 3) from LVLH to the body; any time has an answer."""
         return body_from_lvlh(*self.angles_deg(tai_s).T)
-
-    @property
-    def imaging_tai_s(self) -> tuple[tuple[float, float], ...]:
-        """When the camera works."""
-        return tuple((hold.start_tai_s, hold.end_tai_s) for hold in self.holds if hold.is_imaging)
 
 
 def plan_attitude(holds: Sequence[Hold], agility: Agility) -> AttitudePlan:
@@ -111,7 +107,8 @@ def plan_attitude(holds: Sequence[Hold], agility: Agility) -> AttitudePlan:
                 f"the slew of {turn_deg:.1f} deg takes {needed_s:.1f} s with settling: move the holds apart"
             )
     settled = [
-        Hold(hold.start_tai_s - agility.settle_s * bool(i), hold.end_tai_s, *hold.angles_deg, False)
+        Hold(hold.start_tai_s - agility.settle_s * bool(i), hold.end_tai_s, *hold.angles_deg)
         for i, hold in enumerate(holds)
     ]
-    return AttitudePlan(tuple(settled))
+    imaging = tuple((hold.start_tai_s, hold.end_tai_s) for hold in holds if hold.is_imaging)
+    return AttitudePlan(tuple(settled), imaging)

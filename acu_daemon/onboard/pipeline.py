@@ -51,7 +51,9 @@ def make(
     planned = replace(task, cone=replace(task.cone, margin_deg=task.margin_deg - spare_deg))
     profile = make_profile(planned, station, method, objective)
     if profile is None:
-        raise ProfileError(why_not(planned))
+        raise ProfileError(why_not(planned, spare_deg))
+    if profile.bound is not None:
+        profile = replace(profile, bound=find_branches(task)[0].bound)  # of the whole margin, the backlash's share too
     first = check_profile(task, profile)
     if play_deg > 0.0:
         profile = _led(task, profile, backlash)
@@ -85,8 +87,8 @@ def refuse_out_of_reach(task: Task) -> None:
         )
 
 
-def why_not(task: Task) -> str:
-    """Why no free path was found, in one line, and what would help."""
+def why_not(task: Task, spare_deg: float = 0.0) -> str:
+    """Why no free path was found, in one line, and what would help; spare_deg: of the margin, beyond the task's."""
     limits = task.azimuth
     if not find_branches(task):
         span = np.ptp(task.station_gimbal(task.view).az_deg)
@@ -95,7 +97,7 @@ def why_not(task: Task) -> str:
             f"{limits.min_deg:g} to {limits.max_deg:g} deg: widen the range or the margin, or shorten the pass"
         )
     if bound_at(task, task.margin_deg) > _TIGHT * limits.max_rate_deg_s:
-        return _what_the_rate_needs(task)
+        return _what_the_rate_needs(task, spare_deg)
     if free_profile(replace(task, azimuth=_unlimited(task.azimuth), elevation=_unlimited(task.elevation))) is not None:
         return (
             "accelerations or elevation's rate are too tight for the pass: raise max_acceleration_deg_s2 or the margin"
@@ -103,19 +105,19 @@ def why_not(task: Task) -> str:
     return "no polynomials keep to the margin: widen margin_deg, or turn the satellite more slowly"
 
 
-def _what_the_rate_needs(task: Task) -> str:
+def _what_the_rate_needs(task: Task, spare_deg: float) -> str:
     rate = task.azimuth.max_rate_deg_s
     margin_deg, gap = least_margin_deg(task, rate), least_interruption(task, rate)
     ways = []
     if margin_deg is not None:
-        ways.append(f"a margin of {margin_deg:.2f} deg")
+        ways.append(f"a margin of {np.ceil(100.0 * (margin_deg + spare_deg)) / 100.0:.2f} deg")
     if gap is not None:
         start = utc_text(float(task.view.tai_s[0]) + gap.start_s, 0)
         ways.append(f"{np.ceil(gap.length_s):.0f} s of interruption from {start} on")
     least = bound_at(task, task.margin_deg)
     return (
         f"limit {rate:g} deg/s needs {', or '.join(ways) or 'another attitude'}; "
-        f"with the margin of {task.margin_deg:g} deg the least rate is {least:.3g} deg/s"
+        f"with the margin of {task.margin_deg + spare_deg:g} deg the least rate is {least:.3g} deg/s"
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from acu_daemon.model import AxisLimits, Pass, Site, Station
 from acu_daemon.onboard.attitude import Agility, AttitudePlan, Hold, plan_attitude
 from acu_daemon.onboard.cone import Cone
-from acu_daemon.onboard.frames import lvlh_from_inertial, roll_pitch_to
+from acu_daemon.onboard.missions import angles_to, with_nadir
 from acu_daemon.onboard.profile import Task, within
 from acu_daemon.onboard.view import ground_points_itrs_m, view_pass
 from acu_daemon.orbit.element_set import SGP4_MU_M3_S2, ElementSet
@@ -21,7 +21,7 @@ from acu_daemon.orbit.frames import station_itrs_m, teme_from_itrs
 from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator
 from acu_daemon.orbit.timescales import tai_from_utc
-from acu_daemon.units import DAY_S, DEG, Array
+from acu_daemon.units import DAY_S, DEG
 
 DAEJEON = Station("Daejeon", 36.37, 127.36, 80.0)
 KINDS = ("nadir", "strip", "stereo", "multi-point", "domestic", "strip+playback")
@@ -139,7 +139,7 @@ def _domestic(propagator: Sgp4Propagator, seen: Pass, rng: np.random.Generator) 
     r_m, _ = propagator.states_teme(times)
     ranges = np.linalg.norm(teme_from_itrs(target, times, Site(DAEJEON).orientation) - r_m, axis=1)
     middle = float(times[int(np.argmin(ranges))]) + float(rng.uniform(-20.0, 20.0))
-    roll_deg, pitch_deg = angles_to(propagator, target, middle, Site(DAEJEON))
+    roll_deg, pitch_deg = angles_to(propagator, target, middle, Site(DAEJEON).orientation)
     if max(abs(roll_deg), abs(pitch_deg)) > _STEEPEST_DEG:
         return None
     return _imaging([(middle - length_s / 2.0, length_s, roll_deg, pitch_deg)], seen)
@@ -152,19 +152,11 @@ def _strip_playback(propagator: Sgp4Propagator, seen: Pass, rng: np.random.Gener
 
 
 def _imaging(shots: list[tuple[float, float, float, float]], seen: Pass) -> _Holds:
-    """Nadir, the shots (start, length, roll, pitch) and nadir again; None where they do not fit into the pass."""
-    agility = Agility()
-    holds = []
-    first, last = shots[0], shots[-1]
-    lead_s = agility.slew_s(max(abs(first[2]), abs(first[3]))) + agility.settle_s
-    if last[0] + last[1] > seen.set_tai_s:
+    """Holds of the shots (start, length, roll, pitch) with nadir around; None where they do not fit into the pass."""
+    if shots[-1][0] + shots[-1][1] > seen.set_tai_s:
         return None
-    begin = first[0] - lead_s
-    holds.append(Hold(min(begin, seen.rise_tai_s) - 1.0, begin - 0.01))
-    holds += [Hold(start, start + length_s, roll, pitch, 0.0, True) for start, length_s, roll, pitch in shots]
-    back = last[0] + last[1] + agility.slew_s(max(abs(last[2]), abs(last[3]))) + agility.settle_s + 0.01
-    holds.append(Hold(back, max(back, seen.set_tai_s) + 1.0))
-    return holds
+    holds = [Hold(start, start + length_s, roll, pitch, 0.0, True) for start, length_s, roll, pitch in shots]
+    return with_nadir(holds, Agility(), seen.rise_tai_s, seen.set_tai_s)
 
 
 _MISSIONS: dict[str, Callable[[Sgp4Propagator, Pass, np.random.Generator], _Holds]] = {
@@ -175,14 +167,6 @@ _MISSIONS: dict[str, Callable[[Sgp4Propagator, Pass, np.random.Generator], _Hold
     "domestic": _domestic,
     "strip+playback": _strip_playback,
 }
-
-
-def angles_to(propagator: Sgp4Propagator, target_itrs_m: Array, tai_s: float, site: Site) -> tuple[float, float]:
-    """Roll and pitch, degrees, that point the body's +Z at a point (3,) of the Earth at one time."""
-    at = np.array([tai_s])
-    r_m, v_m_s = propagator.states_teme(at)
-    to_target = teme_from_itrs(target_itrs_m, at, site.orientation) - r_m
-    return roll_pitch_to((lvlh_from_inertial(r_m, v_m_s) @ to_target[0])[0])
 
 
 def scenario_task(scenario: Scenario, cone: Cone, azimuth: AxisLimits | None = None) -> Task:

@@ -1,0 +1,281 @@
+"""Profiles end to end: every stage on the example pass, the file, the commands, and what is refused."""
+
+import json
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_aems import kvn, quaternions
+from onboard_tasks import made_scenario, made_task
+
+from acu_daemon.edge.onboard import load_pass
+from acu_daemon.errors import ProfileError, UsageError
+from acu_daemon.model import AxisLimits
+from acu_daemon.onboard.bound import least_rate
+from acu_daemon.onboard.checks import Backlash, check_profile
+from acu_daemon.onboard.cone import Cone, Tube, azimuth_tube, windings
+from acu_daemon.onboard.corrections import after_backlash, aimed, best_turn_deg, with_backlash
+from acu_daemon.onboard.frames import angles_between_deg, beam_direction, lvlh_from_inertial
+from acu_daemon.onboard.free import AZIMUTH_GUARD, free_profile
+from acu_daemon.onboard.parameter_file import read, write
+from acu_daemon.onboard.pipeline import make
+from acu_daemon.onboard.profile import off_pointing, peak_rate_deg_s
+from acu_daemon.onboard.quintic import Knots
+from acu_daemon.onboard.relief import least_interruption, least_margin_deg
+from acu_daemon.onboard.scenarios import DAEJEON
+
+EXAMPLE = Path(__file__).resolve().parents[1] / "config" / "onboard"
+FILE_DEG = 1e-6
+
+
+def onboard(*arguments: str | Path) -> "subprocess.CompletedProcess[str]":
+    command = [sys.executable, "-m", "acu_daemon", "onboard", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def pass_file(folder: Path, *changes: tuple[str, str]) -> Path:
+    """The example with changes, each of which must be there to be made."""
+    (folder / "kompsat-3-alike.tle").write_text((EXAMPLE / "kompsat-3-alike.tle").read_text())
+    text = (EXAMPLE / "pass.toml").read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "pass.toml"
+    path.write_text(text)
+    return path
+
+
+def test_the_example_pass_becomes_a_file_that_reads_back_the_same_and_holds_the_margin(tmp_path: Path) -> None:
+    planned = load_pass(EXAMPLE / "pass.toml")
+    task = planned.task()
+    made = make(task, planned.station, "free", "peak", planned.file.antenna.play)
+    assert made.is_met
+    start = float(task.view.tai_s[0])
+    text = write(start, made.profile, {"MARGIN_DEG": "2"}, made.second)
+    found = read(text, "pass.tpf")
+    assert found.start_tai_s == start
+    assert found.end_s == pytest.approx(float(task.view.time_s[-1]))
+    for ours, theirs in (
+        (made.profile.azimuth, found.profile.azimuth),
+        (made.profile.elevation, found.profile.elevation),
+    ):
+        times = np.linspace(0.0, found.end_s - 1e-3, 5001)
+        assert theirs.value(times) == pytest.approx(ours.value(times), abs=FILE_DEG)
+    assert found.profile.bound is not None
+    assert found.profile.bound.rate_deg_s == pytest.approx(made.profile.bound.rate_deg_s)
+    assert all(check.is_met for check in check_profile(task, found.profile, planned.file.antenna.play))
+
+
+def test_the_command_writes_draws_and_checks(tmp_path: Path) -> None:
+    path, out, picture = pass_file(tmp_path), tmp_path / "pass.tpf", tmp_path / "pass.png"
+    made = onboard("profile", path, "--out", out, "--plot", picture)
+    assert made.returncode == 0, made.stderr
+    assert picture.stat().st_size > 50_000
+    checked = onboard("check", out)
+    assert checked.returncode == 0, checked.stderr + checked.stdout
+    assert "certificate's bounds" in checked.stdout
+    lines = out.read_text().splitlines()
+    k = next(k for k, line in enumerate(lines) if line.startswith("AZ "))
+    fields = lines[k].split()
+    fields[4] = f"{float(fields[4]) + 0.01:+.9e}"
+    out.write_text("\n".join([*lines[:k], " ".join(fields), *lines[k + 1 :]]))
+    wrong = onboard("check", out)
+    assert wrong.returncode == 1
+    assert "azimuth joints" in wrong.stderr
+
+
+def test_a_rate_limit_that_cannot_be_met_says_what_it_needs_and_that_suffices(tmp_path: Path) -> None:
+    path = pass_file(tmp_path, ("max_deg = 270.0\nmax_rate_deg_s = 5.0", "max_deg = 270.0\nmax_rate_deg_s = 1.5"))
+    with pytest.raises(ProfileError) as told:
+        planned = load_pass(path)
+        make(planned.task(), planned.station, "free", "peak", planned.file.antenna.play)
+    found = re.match(
+        r"limit 1.5 deg/s needs a margin of ([\d.]+) deg, or (\d+) s of interruption from", str(told.value)
+    )
+    assert found, str(told.value)
+    planned = load_pass(path)
+    made = make(planned.task(float(found[1])), planned.station, "free", "peak", planned.file.antenna.play)
+    assert made.is_met
+    assert onboard("profile", path).returncode == 1
+
+
+def test_the_least_interruption_suffices_and_a_shorter_one_does_not() -> None:
+    task = made_task(8, 1.0)
+    view = task.view.plan
+    station = task.station_gimbal(view)
+    narrow = azimuth_tube(Cone(AZIMUTH_GUARD), view.time_s, station.az_deg, station.el_deg)
+    limit = 0.7 * least_rate(narrow).rate_deg_s
+    gap = least_interruption(task, limit)
+    assert gap is not None
+
+    def rate(trim_s: float) -> float:
+        inside = (view.time_s > gap.start_s + trim_s + 1e-6) & (view.time_s < gap.end_s - trim_s - 1e-6)
+        lower, upper = (
+            np.where(inside, sign * np.inf, one) for sign, one in ((-1, narrow.lower_deg), (1, narrow.upper_deg))
+        )
+        return min(least_rate(one).rate_deg_s for one in windings(Tube(view.time_s, lower, upper), station.az_deg))
+
+    assert rate(0.0) <= limit
+    assert rate(1.0) > 0.99 * limit
+
+
+def test_the_least_margin_lets_a_free_path_keep_to_the_rate() -> None:
+    task = made_task(3, 1.0)
+    margin_deg = least_margin_deg(task, 0.45)
+    assert margin_deg is not None
+    wider = replace(task, cone=Cone(margin_deg), azimuth=AxisLimits(-270.0, 270.0, 0.45, np.inf))
+    assert free_profile(wider) is not None
+    assert free_profile(replace(wider, cone=Cone(0.97 * margin_deg))) is None
+
+
+def test_planned_imaging_first_the_azimuth_is_quiet_while_the_camera_works() -> None:
+    task = made_task(2, 2.0)
+    usual, quiet = free_profile(task), free_profile(task, "imaging", cap_deg_s=1.0)
+    assert usual is not None
+    assert quiet is not None
+    at_s = task.view.time_s[task.imaging]
+    assert np.abs(quiet.azimuth.value(at_s, 1)).max() < 0.02
+    assert np.abs(usual.azimuth.value(at_s, 1)).max() > 0.1
+    assert peak_rate_deg_s(quiet.azimuth, task.view) <= 1.0
+    assert off_pointing(task, quiet.gimbal(task.view.time_s), task.view).max() <= 2.0
+
+
+def test_a_drive_too_slow_for_its_target_is_smoothed_and_the_loss_is_told() -> None:
+    task = made_task(8, 1.0, azimuth=AxisLimits(-270.0, 270.0, 1.0, 0.5))
+    made = make(task, DAEJEON, "single")
+    named = {check.name: check for check in made.second}
+    assert named["azimuth rate"].is_met
+    assert named["azimuth acceleration"].is_met
+    assert not named["off-pointing"].is_met
+    assert "contact lost for" in named["off-pointing"].detail
+
+
+def test_the_beam_of_an_offset_boresight_is_put_on_the_target() -> None:
+    task = made_task(8, 1.0)
+    cone = Cone(1.0, boresight_elevation_deg=0.5, boresight_cross_deg=0.4)
+    p = task.view.unit(task.station_itrs_m)
+    assert angles_between_deg(beam_direction(aimed(p, cone), cone.boresight), p).max() < 1e-6
+
+
+def test_backlash_is_led_in_the_direction_of_the_motion() -> None:
+    knots = Knots(np.array([0.0, 20.0, 40.0]))
+    path = knots.path(np.array([0.0, 20.0, 0.0, 10.0, 0.0, -20.0, 0.0, -20.0, 0.0]))
+    time_s = np.arange(801) * 0.05
+    true = path.value(time_s)
+    behind = after_backlash(true, 0.2) - true
+    led = after_backlash(with_backlash(path, time_s, 0.2), 0.2) - true
+    moving = np.abs(path.value(time_s, 1)) > 0.3
+    assert np.abs(behind).max() == pytest.approx(0.1, abs=1e-3)
+    assert np.abs(led[moving]).max() < 0.01
+
+
+def test_the_turn_of_the_cable_that_fits_is_taken() -> None:
+    limits = AxisLimits(0.0, 400.0, 1.0, 1.0)
+    assert best_turn_deg(np.array([-170.0, -20.0]), limits) == 360.0
+    assert best_turn_deg(np.array([20.0, 300.0]), limits) == 0.0
+
+
+def test_an_attitude_file_gives_the_profile_of_the_plan_it_was_made_from(tmp_path: Path) -> None:
+    planned = load_pass(EXAMPLE / "pass.toml")
+    seen = planned.seen
+    tai_s = np.arange(np.floor(seen.rise_tai_s) - 2.0, seen.set_tai_s + 3.0)
+    lvlh = lvlh_from_inertial(*planned.propagator.states_teme(tai_s))
+    (tmp_path / "a.aem").write_text(kvn(quaternions(planned.attitude.body_from_lvlh(tai_s, lvlh)), tai_s))
+    path = pass_file(tmp_path)
+    head, _, _ = path.read_text().partition("[attitude]")
+    path.write_text(head + '[attitude]\nfile = "a.aem"\n')
+    task, other = planned.task(), load_pass(path).task()
+    a, b = (one.view.unit(one.station_itrs_m) for one in (task, other))
+    assert angles_between_deg(a, b).max() < 1e-3
+    holes = (tmp_path / "a.aem").read_text().splitlines()
+    at = next(k for k, line in enumerate(holes) if "T04:29:20" in line)
+    (tmp_path / "a.aem").write_text("\n".join(holes[:at] + holes[at + 8 :]))
+    refused = onboard("profile", path)
+    assert refused.returncode == 2
+    assert "a gap of 9.0 s in the attitude" in refused.stderr
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("margin_deg = 2.0", "margin_deg = 0.0"), "antenna.margin_deg = 0.0: expected more than 0"),
+        (("margin_deg = 2.0", "margins_deg = 2.0"), "did you mean margin_deg?"),
+        (("min_elevation_deg = 5.0", "min_elevation_deg = 89.0"), "change from_utc, lower min_elevation_deg"),
+        (("roll_deg = -18.0", "roll_deg = -45.0"), "the body turns 30 deg at the most"),
+        (("duration_s = 25.0", "duration_s = 120.0"), "move the holds apart"),
+        (("min_deg = -270.0", "min_deg = 280.0"), "expected less than max_deg"),
+        (('file = "kompsat-3-alike.tle"', 'file = "no.tle"'), "No such file"),
+    ],
+)
+def test_what_is_wrong_with_a_pass_is_told_with_what_to_change(
+    tmp_path: Path, change: tuple[str, str], said: str
+) -> None:
+    with pytest.raises(UsageError) as told:
+        load_pass(pass_file(tmp_path, change))
+    assert said in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("max_deg = 110.0", "max_deg = 60.0"), "beyond the elevation range of 60 deg"),
+        (("max_deg = 270.0", "max_deg = -150.0"), "widen the range or the margin"),
+        (("max_acceleration_deg_s2 = 2.0", "max_acceleration_deg_s2 = 0.01"), "raise max_acceleration_deg_s2"),
+    ],
+)
+def test_impossible_limits_are_told_with_what_to_change(tmp_path: Path, change: tuple[str, str], said: str) -> None:
+    planned = load_pass(pass_file(tmp_path, change))
+    with pytest.raises(ProfileError) as told:
+        make(planned.task(), planned.station, "free", "peak", planned.file.antenna.play)
+    assert said in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("TRACKING_PARAMETER_FILE = 1", "TRACKING_PARAMETER_FILE = 7"), "of this version"),
+        (("PIECES = ", "PIECES = 1"), "the file is not whole"),
+        (("AZ 2", "AZ x2"), "line "),
+        (("METHOD = free", "METHOD = best"), "expected one of single"),
+    ],
+)
+def test_a_file_that_is_cut_or_changed_is_refused_with_its_line(change: tuple[str, str], said: str) -> None:
+    task = made_task(0, 2.0)
+    profile = free_profile(task)
+    text = write(float(task.view.tai_s[0]), profile, {}, [])
+    assert change[0] in text
+    with pytest.raises(UsageError, match=r"^pass\.tpf"):
+        read(text.replace(*change, 1), "pass.tpf")
+    with pytest.raises(UsageError) as told:
+        read(text.replace(*change, 1), "pass.tpf")
+    assert said in str(told.value)
+
+
+def test_scenarios_are_the_same_whatever_the_count_and_written_as_rows(tmp_path: Path) -> None:
+    rows = tmp_path / "rows.json"
+    done = onboard("scenarios", "--count", "2", "--seed", "6", "--margin-deg", "2", "--jobs", "1", "--json", rows)
+    assert done.returncode == 0, done.stderr
+    assert "samples beyond the margin (20 Hz, all methods): 0" in done.stdout
+    written = json.loads(rows.read_text())
+    assert written["margin_deg"] == 2.0
+    keys = [
+        "seed",
+        "kind",
+        "culmination_deg",
+        "single_deg_s",
+        "three_deg_s",
+        "search_deg_s",
+        "free_deg_s",
+        "bound_deg_s",
+    ]
+    assert list(written["rows"][0])[:9] == [*keys, "violations"]
+    assert written["rows"][1]["culmination_deg"] == pytest.approx(made_scenario(7).seen.culmination_el_deg)
+
+
+def test_backlash_that_takes_all_of_the_margin_is_refused() -> None:
+    with pytest.raises(ProfileError, match="widen margin_deg"):
+        make(made_task(0, 0.1), DAEJEON, "free", "peak", Backlash(0.2, 0.2))
