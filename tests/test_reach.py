@@ -63,3 +63,9 @@ def test_plan_and_list_of_passes_say_how_long_the_elevation_cannot_follow(max_de
         seconds = {why: sum(one.duration_s for one in beyond if one.why == why) for why in {b.why for b in beyond}}
         assert seconds[f"elevation above {max_deg:g} deg"] == pytest.approx(0.1 * np.sum(el_deg > max_deg), abs=1.1)
         assert seconds["elevation below 7 deg"] == pytest.approx(0.1 * np.sum(el_deg < 7.0), abs=2.1)
+
+
+def test_a_path_that_begins_out_of_reach_and_comes_into_it_is_told_for_its_beginning_alone() -> None:
+    el_deg = np.full(TAI_S.size, 40.0)
+    [lost] = out_of_reach(TAI_S, 250.0 - TAI_S, el_deg, with_range(0.0, 200.0), EVERY)
+    assert (lost.from_tai_s, lost.to_tai_s) == (0.0, 50.0)

@@ -7,13 +7,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from flights import RISING_TAI_S, climb, demo_target, events_named, worst_error_deg
 from hypothesis import given
 from hypothesis import strategies as st
 from test_tick import CONFIG, FITTED, NOW, PLAN, ready, saw, status
 
+from acu_daemon.control.refit import RefitReply, RefitRequest
 from acu_daemon.control.state import ControlState, Observation, Orders, PathOffset, Sky, Stage
 from acu_daemon.control.states import TrackState
 from acu_daemon.control.tick import tick
+from acu_daemon.edge.fit import InlineFitRunner
 from acu_daemon.model import Correction, FitResult, Model
 from acu_daemon.pointing.axis import AxisState
 from acu_daemon.protocol.messages import AcuMode, WriteAndPoll, WriteRegisters
@@ -123,3 +126,26 @@ def test_p5_an_offset_that_is_not_finite_reaches_no_command(place):
     state, orders = tick(state, seen, sky, NOW, CONFIG)
     check(orders)
     assert state.gate_refusal_count == 1
+
+
+class Spoiling(InlineFitRunner):
+    """From an instant on, its answers are no numbers."""
+
+    from_tai_s = RISING_TAI_S + 10.0
+
+    async def refit(self, request: RefitRequest) -> RefitReply:
+        reply = await super().refit(request)
+        if request.now_tai_s < self.from_tai_s:
+            return reply
+        return replace(reply, prediction=spoiled(reply.prediction, ("el_deg",), nan))
+
+
+def test_p5_answers_of_the_fit_that_are_not_finite_are_refused_and_the_last_good_buffer_is_followed() -> None:
+    target = demo_target(tracking={"horizon_s": 30.0, "low_water_s": 10.0})  # so that it would run dry
+    flight = climb(60.0, target, losses=[(12.0, 58.0)], make_runner=Spoiling)
+    assert events_named(flight, "fit.refused")
+    assert flight.outcome is not None
+    assert flight.outcome.refit_failed_count == len(events_named(flight, "fit.refused"))
+    assert flight.outcome.refusal_count == 0
+    assert worst_error_deg(flight, RISING_TAI_S + 12.5, RISING_TAI_S + 58.0) < 0.1
+    assert min(seen.buffer_s for seen in flight.snapshots[200:]) > 5.0

@@ -153,3 +153,10 @@ def test_a_bearing_between_the_ends_goes_to_the_nearer_one_and_in_the_middle_sta
     assert nearest_end_deg(200.0, 0.0, limits) == -150.0
     assert nearest_end_deg(178.0, -100.0, limits) == nearest_end_deg(182.0, -100.0, limits) == -150.0
     assert nearest_end_deg(178.0, 100.0, limits) == nearest_end_deg(182.0, 100.0, limits) == 150.0
+
+
+def test_of_turns_that_do_not_hold_the_start_the_one_that_holds_most_is_taken():
+    az, el = _path(250.0, -150.0, 40.0)
+    turn = choose_turn(az, el, _limits(0.0, 200.0), present_az_deg=10.0)
+    assert (turn.offset_deg, turn.held_fraction) == (0.0, 0.0)
+    assert 0.3 < turn.inside_fraction < 0.9

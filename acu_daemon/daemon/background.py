@@ -245,6 +245,7 @@ class Background:
         if not reply.prediction.is_finite or (reply.fit is not None and not is_fit(reply.fit)):
             area.refit_failed_count += 1
             self._log.warning("fit.refused", reason="not finite: the last good one stays")
+            self._predict_here(self._clock.tai_s())
             return
         if reply.fit is not None and area.sky.fit is None:
             self._log.info(

@@ -50,9 +50,9 @@ def out_of_reach(
         *_spans("elevation", tai_s, el_deg > elevation.max_deg, f"elevation above {elevation.max_deg:g} deg"),
         *_spans("elevation", tai_s, el_deg < elevation.min_deg, f"elevation below {elevation.min_deg:g} deg"),
     ]
-    leaving = np.flatnonzero(is_out & ~is_lost)
+    leaving = np.flatnonzero(is_out[1:] & ~is_lost[1:] & ~is_out[:-1])
     if leaving.size:
-        first = int(leaving[0])
+        first = int(leaving[0]) + 1
         way_deg = min(abs(turn - float(az_deg[first])) for turn in turns_of(float(az_deg[first]), azimuth))
         begin_tai_s, end_tai_s = float(tai_s[first]), float(tai_s[-1])
         back_tai_s = min(begin_tai_s + way_deg / azimuth.max_rate_deg_s, end_tai_s)

@@ -24,14 +24,16 @@ END_TIE_DEG = 10.0
 class Turn:
     """The turn to take: add offset_deg (a multiple of 360) to the path.
 
-    held_fraction: how much of the path, from its start, lies within the soft limits.  holds_either_way: also the path
-    that passes the zenith on the other side (the same as holds_path where the culmination is too low for that).
+    held_fraction: how much of the path, from its start, lies within the soft limits; inside_fraction: of all of it.
+    holds_either_way: also the path that passes the zenith on the other side (the same as holds_path where the
+    culmination is too low for that).
     """
 
     offset_deg: float
     holds_path: bool
     holds_either_way: bool
     held_fraction: float
+    inside_fraction: float
     reason: str
 
 
@@ -40,7 +42,7 @@ def choose_turn(path_az_deg: Array, path_el_deg: Array, limits: AxisLimits, pres
 
     path_az_deg (N,): azimuth continuous over the whole pass (or the rest of it); path_el_deg (N,): elevations of the
     same instants.  Near the zenith a turn that holds both ways round is preferred.  If none holds the path: the one
-    that holds it longest from its start, and the result says so.
+    that holds it longest from its start, then the one that holds most of it, and the result says so.
     """
     other_az_deg = _other_way(path_az_deg, path_el_deg)
     first = floor((limits.min_deg - float(path_az_deg.max())) / 360.0)
@@ -49,7 +51,7 @@ def choose_turn(path_az_deg: Array, path_el_deg: Array, limits: AxisLimits, pres
 
     def merit(turn: Turn) -> tuple[float, ...]:
         away_deg = abs(float(path_az_deg[0]) + turn.offset_deg - present_az_deg)
-        return (turn.holds_either_way, turn.holds_path, turn.held_fraction, -away_deg)
+        return (turn.holds_either_way, turn.holds_path, turn.held_fraction, turn.inside_fraction, -away_deg)
 
     return max(turns, key=merit)
 
@@ -78,7 +80,7 @@ def _judge(offset_deg: float, az_deg: Array, other_az_deg: Array, limits: AxisLi
         reason = "holds the pass as predicted, not if it passes the zenith on the other side"
     else:
         reason = f"no turn holds the whole pass: this one holds the first {held:.0%} of it"
-    return Turn(offset_deg, holds_path, holds_path and holds_other, held, reason)
+    return Turn(offset_deg, holds_path, holds_path and holds_other, held, float(inside.mean()), reason)
 
 
 def nearest_turn(az_deg: float, near_deg: float, limits: AxisLimits) -> float | None:
