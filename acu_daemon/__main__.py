@@ -10,6 +10,7 @@ def main() -> None:
     try:
         gc.disable()  # what is loaded is no garbage, and looking for some takes a fifth of the start
         keep_out_the_working_directory()  # before anything more is loaded: it might be found there
+        from acu_daemon.edge.denied import denied
         from acu_daemon.edge.signals import guard_the_start
 
         guard_the_start()
@@ -20,8 +21,6 @@ def main() -> None:
     except KeyboardInterrupt:
         sys.exit(130)
     except (ImportError, MemoryError, OSError) as error:  # while it is loaded; the command line tells all else itself
-        from acu_daemon.edge.denied import denied
-
         print(f"acu-daemon: the system denies what this needs: {denied(error)}", file=sys.stderr)  # noqa: T201
         sys.exit(2)
 

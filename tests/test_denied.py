@@ -117,12 +117,10 @@ def test_files_directories_and_sockets_that_are_denied(tmp_path: Path) -> None:
     assert not unlike
 
 
-def shell(arguments: str, directory: Path, **environment: str) -> "subprocess.CompletedProcess[str]":
-    """The command with redirections of a shell."""
-    line = f'"{sys.executable}" -m acu_daemon {arguments}'
-    return subprocess.run(
-        ["sh", "-c", line], cwd=directory, env=environment, capture_output=True, text=True, timeout=PATIENCE_S
-    )
+def shell(arguments: str, directory: Path, before: str = "") -> "subprocess.CompletedProcess[str]":
+    """The command with redirections and limits of a shell."""
+    line = f'{before} exec "{sys.executable}" -m acu_daemon {arguments}'
+    return subprocess.run(["sh", "-c", line], cwd=directory, env={}, capture_output=True, text=True, timeout=PATIENCE_S)
 
 
 @pytest.mark.realtime
@@ -171,6 +169,16 @@ def open_path() -> Iterator[Path]:
     with tempfile.TemporaryDirectory() as directory:
         Path(directory).chmod(0o755)
         yield Path(directory)
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("command", ["check --config .", "safe-stop --config .", "latency-test --duration 1"])
+def test_a_command_that_is_denied_files_says_so_and_leaves_nothing_half_made(open_path: Path, command: str) -> None:
+    write(open_path, replaced(STATION, "tcp://127.0.0.1:3842", "tcp://127.0.0.1:1"))
+    done = shell(command, open_path, before="ulimit -n 5;")  # of fewer Python itself dies
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.startswith("acu-daemon: the system denies what this needs: ")
+    assert len(done.stderr.splitlines()) == 1, done.stderr
 
 
 def limited(limit: str, rig: Any) -> "subprocess.Popen[bytes]":

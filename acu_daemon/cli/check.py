@@ -30,6 +30,7 @@ from acu_daemon.daemon.port import AcuPort
 from acu_daemon.edge.clock import SystemClock, is_clock_synchronised
 from acu_daemon.edge.latch import ADVICE, DISARMED, LATCH
 from acu_daemon.edge.link import check_rate, make_link
+from acu_daemon.edge.loop import run_loop
 from acu_daemon.edge.state import SNAPSHOT, state_directory, state_path
 from acu_daemon.errors import AcuDaemonError, LinkError, OrbitError, UsageError
 from acu_daemon.model import Site
@@ -111,7 +112,7 @@ def _findings(config: Path, satellite: str | None, now_tai_s: float, state: Path
     except UsageError as error:
         yield Finding(NO_GO, "line rate", str(error))
         return
-    yield from asyncio.run(_acu(station.acu))
+    yield from run_loop(_acu, station.acu)
 
 
 def place_text(site: Site, now_tai_s: float) -> str:

@@ -27,6 +27,7 @@ from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.fit import ProcessFitRunner
 from acu_daemon.edge.link import make_link
 from acu_daemon.edge.logs import configure_logs, tell_signal
+from acu_daemon.edge.loop import run_loop
 from acu_daemon.edge.recording import RecordingWriter
 from acu_daemon.edge.signals import take_signals
 from acu_daemon.errors import AcuDaemonError, UsageError
@@ -74,7 +75,7 @@ def command(
         with resources.as_file(resources.files("acu_daemon.cli") / "demo_config") as files:
             shutil.copytree(files, config)
         try:
-            outcome = asyncio.run(_demo(config, out))
+            outcome = run_loop(_demo, config, out)
         except ExceptionGroup as group:
             raise group.exceptions[0] from None
     if outcome.reason != "duration over":

@@ -1,6 +1,5 @@
 """`acu-daemon fake-acu`: the simulated ACU, pedestal, receiver and sky."""
 
-import asyncio
 import contextlib
 from pathlib import Path
 from typing import Annotated
@@ -11,6 +10,7 @@ from acu_daemon.cli.options import At, AtMonotonic, Config, Satellite, load_targ
 from acu_daemon.cli.serving import Control, Place, parse_place, serve_until_stopped
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.link import BITS_PER_CHARACTER, DEFAULT_BAUD, make_link
+from acu_daemon.edge.loop import run_loop
 from acu_daemon.errors import UsageError
 from acu_daemon.protocol.sa3842 import address_byte
 from acu_daemon.sim.acu import FakeAcu
@@ -95,7 +95,7 @@ def command(
             acu.observer = files.enter_context(TraceWriter(trace)).add
         if wire_log is not None:
             acu.on_write = files.enter_context(WireLogWriter(wire_log)).add
-        asyncio.run(_serve(acu, clock, _where(listen, pty, url), control))
+        run_loop(_serve, acu, clock, _where(listen, pty, url), control)
 
 
 def _where(listen: str | None, pty: Path | None, url: str) -> Place:

@@ -1,6 +1,5 @@
 """`acu-daemon fault-proxy`: a line between daemon and ACU that goes wrong when it is told to."""
 
-import asyncio
 from pathlib import Path
 from typing import Annotated
 
@@ -8,6 +7,7 @@ import typer
 
 from acu_daemon.cli.serving import Control, Place, parse_place, serve_until_stopped
 from acu_daemon.edge.link import BITS_PER_CHARACTER, DEFAULT_BAUD, Link, make_link
+from acu_daemon.edge.loop import run_loop
 from acu_daemon.errors import UsageError
 from acu_daemon.sim.fault_board import FaultBoard
 from acu_daemon.sim.fault_verbs import FRAME_VERBS, Fault
@@ -47,7 +47,7 @@ def command(
         place = Place(*parse_place("--listen", listen or ""))
     else:
         place = Place(pty=pty, baud=round(BITS_PER_CHARACTER / byte_time_s) if byte_time_s else DEFAULT_BAUD)
-    asyncio.run(_serve(to, place, control, faults))
+    run_loop(_serve, to, place, control, faults)
 
 
 async def _serve(to: str, place: Place, control: str | None, faults: tuple[Fault, ...]) -> None:

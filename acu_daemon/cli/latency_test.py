@@ -1,6 +1,5 @@
 """`acu-daemon latency-test`: whether this machine and this link keep the daemon's time, a line per item."""
 
-import asyncio
 import json
 from collections.abc import Iterator
 from importlib import resources
@@ -22,6 +21,7 @@ from acu_daemon.daemon.trial import Trial, try_loop
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.fit import ProcessFitRunner
 from acu_daemon.edge.link import Link, make_link
+from acu_daemon.edge.loop import run_loop
 from acu_daemon.edge.scheduling import keep_to_this_thread, may_be_real_time
 from acu_daemon.errors import UsageError
 from acu_daemon.model import Pass, Readings
@@ -69,7 +69,7 @@ def command(
     scheduling = keep_to_this_thread()
     station = None if config is None else load_station(config)
     link = None if station is None else make_link(station.acu.url)
-    trial = asyncio.run(_measure(station, link, duration))
+    trial = run_loop(_measure, station, link, duration)
     findings = [
         _scheduling(scheduling),
         clock_finding(),

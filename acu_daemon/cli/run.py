@@ -46,6 +46,7 @@ from acu_daemon.edge.denied import denied
 from acu_daemon.edge.fit import ProcessFitRunner
 from acu_daemon.edge.link import Link, check_rate, make_link
 from acu_daemon.edge.logs import configure_logs, tell_dropped, tell_loop_problem, tell_signal
+from acu_daemon.edge.loop import loop_runner
 from acu_daemon.edge.recording import RecordingWriter
 from acu_daemon.edge.scheduling import keep_to_this_thread, scheduling_text
 from acu_daemon.edge.signals import STOPS, take_signals
@@ -139,8 +140,7 @@ def command(
         job = make_job(target, coming, link, is_rehearsal=clock.is_rehearsal, end_tai_s=end_tai_s, carried=kept.carried)
         job = replace(job, control=replace(job.control, is_shadow=shadow))
         job = replace(job, state=kept.state)
-        runner = ends.enter_context(asyncio.Runner())
-        runner.get_loop()  # where the system denies even that, another start would be refused as well
+        runner = ends.enter_context(loop_runner())  # where the system denies even that, another start is refused too
         outcome = _watched(runner, _run(job, link, clock, live, recording, files, kept, directory))
         structlog.get_logger("run").info("run.done", **asdict(outcome))
     if not outcome.is_stopped:

@@ -17,6 +17,7 @@ from acu_daemon.daemon.stopping import DEADLINE_S, stop_antenna
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.link import make_link
 from acu_daemon.edge.logs import configure_logs
+from acu_daemon.edge.loop import run_loop
 from acu_daemon.errors import NoAcuError
 from acu_daemon.protocol.sa3842 import address_byte
 
@@ -45,7 +46,7 @@ def command(
     if after_service and (reason := why_not(os.environ)):
         typer.echo(f"safe-stop: {reason}")
         return
-    if not asyncio.run(_stop(load_station(config))):
+    if not run_loop(_stop, load_station(config)):
         raise typer.Exit(1)
 
 
