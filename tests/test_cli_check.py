@@ -289,6 +289,15 @@ def test_a_wrap_that_cannot_hold_the_pass_is_a_warning(tmp_path: Path) -> None:
     assert "no turn holds the whole pass" in lines(done)["scd: cable wrap"][1]
 
 
+def test_a_pass_that_slow_drives_may_be_late_for_is_a_warning(tmp_path: Path) -> None:
+    with acu() as small:
+        text = station(small.url).replace("max_rate_deg_s = 20.0", "max_rate_deg_s = 0.01")
+        done = acu_daemon("check", "--config", write(tmp_path, text, scd=BROUWER))
+    verdict, said = lines(done)["scd: approach"]
+    assert verdict == "WARN"
+    assert "from the far end of its drives the antenna needs 600" in said
+
+
 def test_manual_arming_and_a_free_running_clock_are_warned_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(check, "is_clock_synchronised", lambda: False)
     with acu() as small:

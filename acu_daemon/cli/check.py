@@ -18,6 +18,7 @@ from acu_daemon.cli.options import (
     Target,
     ending,
     load_target,
+    longest_lead,
     nearest_to_pass,
     not_covered,
     open_ends,
@@ -229,6 +230,10 @@ def _next_pass(name: str, target: Target, now_tai_s: float) -> Iterator[Finding]
         yield Finding(GO, f"{name}: cable wrap", f"the pass is held from azimuth {plan.start_az_deg:.1f} deg on")
     for one in plan.beyond:
         yield Finding(WARN, f"{name}: {one.axis}", str(one))
+    lead_s, left_s = longest_lead(target), coming.rise_tai_s - now_tai_s
+    if 0.0 < left_s < lead_s:
+        why = f"the rise is in {left_s:.0f} s, from the far end of its drives the antenna needs {lead_s:.0f} s"
+        yield Finding(WARN, f"{name}: approach", f"{why}: it may be late, `run` says by how much")
 
 
 async def _acu(acu: AcuSection) -> list[Finding]:

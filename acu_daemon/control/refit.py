@@ -234,8 +234,6 @@ def predict_from(setup: RefitSetup, fit: FitResult | None, request: RefitRequest
         follow=partial(follow_path, azimuth=setup.azimuth),
         fit=fit,
     )
-    at = prediction.at(request.now_tai_s)
-    spread = None
-    if at is not None:
-        spread = spread_of(setup.propagator, setup.site, setup.settings, fit, request.now_tai_s, at)
+    what = (setup.propagator, setup.site, setup.settings)
+    spread = spread_of(*what, fit, prediction, request.now_tai_s)
     return replace(prediction, model=model, spread=spread)

@@ -1,0 +1,53 @@
+"""How far from its prediction a satellite may be: against orbits drawn from the covariance itself."""
+
+import numpy as np
+import pytest
+from flights import RISING_TAI_S, demo_target
+
+from acu_daemon.assist.full_states import correction_of, make_prior
+from acu_daemon.assist.prediction import predict
+from acu_daemon.assist.settings import EstimatorSettings, StateSigmas
+from acu_daemon.assist.spread import spread_of
+from acu_daemon.control.track_frame import offset_of
+from acu_daemon.model import Correction, FitResult
+from acu_daemon.orbit.look import look_at
+
+T = RISING_TAI_S
+DRAW_COUNT = 300
+NO_BIAS = {f"bias_sigma_{name}_deg": 0.0 for name in ("azimuth", "elevation", "azimuth_sec", "elevation_cot")}
+
+
+@pytest.mark.parametrize("at_s", [0.0, 90.0])
+def test_the_spread_of_the_elements_is_that_of_orbits_drawn_from_what_they_are_worth(at_s: float) -> None:
+    target = demo_target()
+    source, site = target.elements.propagator, target.station.site
+    settings = EstimatorSettings(orbit_sigmas=StateSigmas(300.0, 0.3), **NO_BIAS)
+    buffer = predict(source, site, T - 30.0, T, "TLE", 168.0, horizon_s=180.0)
+    spread = spread_of(source, site, settings, None, buffer, T + at_s)
+    assert spread is not None
+    rng = np.random.default_rng(1)
+    covariance = make_prior(source, settings, T).covariance
+    offsets = []
+    for x in rng.multivariate_normal(np.zeros(len(covariance)), covariance, DRAW_COUNT):
+        seen = look_at(source.corrected(correction_of(x)), np.array([T + at_s]), site)
+        offset = offset_of(buffer, T + at_s, float(seen.az_deg[0]), float(seen.el_deg[0]))
+        assert offset is not None
+        offsets.append(offset)
+    along_s, across_deg = np.sqrt(np.mean(np.square(offsets), axis=0))
+    assert spread[0] == pytest.approx(along_s, rel=0.15)
+    assert spread[1] == pytest.approx(across_deg, rel=0.15)
+
+
+def test_old_elements_spread_further_and_a_fit_without_a_covariance_says_nothing() -> None:
+    target = demo_target()
+    source, site = target.elements.propagator, target.station.site
+    buffer = predict(source, site, T - 30.0, T, "TLE", 168.0, horizon_s=90.0)
+    worn = EstimatorSettings(orbit_sigmas=StateSigmas(3000.0, 3.0))
+    fresh = EstimatorSettings(orbit_sigmas=StateSigmas(300.0, 0.3))
+    wide, narrow = (spread_of(source, site, one, None, buffer, T) for one in (worn, fresh))
+    assert wide is not None
+    assert narrow is not None
+    assert wide[0] > 2.0 * narrow[0]  # both hold the encoders' bias
+    fit = FitResult("kalman", Correction(), T, 10, 0, 0.0, 0.0, 0.0)
+    assert spread_of(source, site, fresh, fit, buffer, T) is None
+    assert spread_of(source, site, fresh, None, buffer, T + 100.0) is None
