@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import pytest
@@ -29,11 +30,13 @@ from flights import (
 
 from acu_daemon.cli.virtual_pass import Flight, Stage
 from acu_daemon.config_tables import LEAST_LOW_WATER_S
-from acu_daemon.control.refit import RefitReply, RefitRequest
+from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup, predict_from
 from acu_daemon.daemon.background import RETRY_S, fit_deadline_s
+from acu_daemon.daemon.live import live_text
 from acu_daemon.edge.clock import LoopClock
 from acu_daemon.edge.fit import START_S, FitDiedError, FitFailedError, InlineFitRunner
 from acu_daemon.errors import NoAcuError, UsageError
+from acu_daemon.model import Model
 from acu_daemon.protocol.messages import (
     AcuMode,
     Command,
@@ -565,6 +568,35 @@ def test_p9_a_fit_that_answers_late_disturbs_no_tick() -> None:
     gaps_s = write_gaps_s(flight, T + 8.0)
     assert gaps_s == pytest.approx([TICK_S] * len(gaps_s), abs=1e-3)
     assert worst_error_deg(flight, T + 25.0, T + 35.0) < HOLD_DEG
+
+
+class Denied(InlineFitRunner):
+    """From its tenth answer on it goes back to the elements."""
+
+    def __init__(self, setup: RefitSetup) -> None:
+        super().__init__(setup)
+        self._setup, self._count = setup, 0
+
+    async def refit(self, request: RefitRequest) -> RefitReply:
+        self._count += 1
+        reply = await super().refit(request)
+        if self._count < 10:
+            return reply
+        elements = predict_from(self._setup, None, request, Model.ELEMENTS)
+        return replace(reply, fit=None, prediction=elements, model=Model.ELEMENTS)
+
+
+def test_when_the_elements_steer_again_state_snapshot_and_live_line_say_so() -> None:
+    flight = climb(40.0, losses=[(20.0, 30.0)], make_runner=Denied)
+    states = flight.states()
+    at = states.index("AUTOTRACK/FITTED")
+    assert states[at:] == ["AUTOTRACK/FITTED", "AUTOTRACK/TLE", "HOLD/TLE", "AUTOTRACK/TLE"]
+    for seen in flight.snapshots:
+        is_fitted = seen.buffer_kind == "FITTED"
+        assert (seen.model == "new fit") == is_fitted
+        assert seen.state.endswith("FITTED") <= is_fitted
+        assert ("no fit in force" in live_text(seen)) == (not is_fitted)
+    assert worst_error_deg(flight, T + 20.0, T + 30.0) < HOLD_DEG  # on what autotrack showed of the path
 
 
 class Hanging(InlineFitRunner):

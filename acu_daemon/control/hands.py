@@ -9,6 +9,7 @@ from math import inf
 
 from acu_daemon.control.axis_watch import AWAY, AxisSeen, duty_of, sky_scale, watch_axes
 from acu_daemon.control.changed import changed
+from acu_daemon.control.lag import LagEstimate
 from acu_daemon.control.relearn import doubt, may_be_other_turn
 from acu_daemon.control.start import WATCHDOG, anew
 from acu_daemon.control.state import ControlConfig, ControlState, Event, Held, Observation, Request, Stage, Watchdog
@@ -163,7 +164,8 @@ def watch_antenna(state: ControlState, seen: Observation, config: ControlConfig,
         return doubt(state, config, events, problem)
     fields = {"problem": problem, "az_deg": state.az_deg, "el_deg": el_deg, "advice": "look, then `acu-daemon clear`"}
     events.append(Event("axis.latched", fields, is_warning=True))
-    return changed(state, latch=problem, is_stop_due=True)
+    no_lag = LagEstimate()  # of an axis that failed nothing is kept
+    return changed(state, latch=problem, is_stop_due=True, lag_az=no_lag, lag_el=no_lag)
 
 
 def _rates_deg_s(state: ControlState) -> tuple[float, float]:

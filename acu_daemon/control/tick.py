@@ -177,7 +177,7 @@ def _walk(
 
 def _lateness(state: ControlState, sky: Sky, now_tai_s: float, config: ControlConfig) -> list[Event]:
     """Say that the antenna sets out too late to be there at the rise."""
-    if sky.plan is None:
+    if sky.plan is None or state.has_acquired:
         return []
     way = way_to(sky.plan, state, config)
     late_s = now_tai_s + way.both_s - sky.plan.rise_tai_s
