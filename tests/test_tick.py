@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from acu_daemon.control.absorb import REFUSED_EXTRA_S, REFUSED_PAUSE_S
 from acu_daemon.control.causes import LINK_SILENCE_S
 from acu_daemon.control.fence import fence
+from acu_daemon.control.lag import LagEstimate
 from acu_daemon.control.state import (
     ControlConfig,
     ControlState,
@@ -134,6 +135,21 @@ def test_a_lag_is_learned_only_from_writes_that_come_a_period_apart(gap_s: float
         state, _ = tick(state, Observation(reading=reading, status=seen), FITTED, now_tai_s, CONFIG)
     assert (state.lag_az.count > 0) is is_learned
     assert (state.lag_el.count > 0) is is_learned
+
+
+def test_a_latch_forgets_the_lag_that_was_learned_of_an_axis_that_failed() -> None:
+    seen = status(AcuMode.REMOTE_BACKUP)
+    state = replace(ready(TrackState.HOLD_FITTED, seen), hold_from_tai_s=NOW, lag_az=LagEstimate(500, 5.0, 2.0, 0.9))
+    learned_s, _ = state.lag_s(CONFIG)
+    for k in range(100):
+        reading = Reading(NOW + 0.1 * k + 0.01, AZ_DEG, EL_DEG, False)  # it stands while the path goes on
+        state, _ = tick(state, Observation(reading=reading, status=seen), FITTED, NOW + 0.1 * (k + 1), CONFIG)
+        if state.latch:
+            break
+        assert state.lag_az.count >= 500
+    assert state.latch
+    assert state.lag_s(CONFIG)[0] != pytest.approx(learned_s)
+    assert state.lag_az == LagEstimate()
 
 
 def test_the_tilt_register_goes_back_as_it_was_read() -> None:

@@ -39,7 +39,9 @@ def learn_of_signal(
         has_acquired=True,
         has_locked=state.has_locked or seen.reading.tai_s - since_tai_s >= config.lock_dwell_s,
     )
-    return _learn_offset(state, seen.reading, sky, config, events) if state.track is TrackState.AUTOTRACK_TLE else state
+    if state.track is not TrackState.AUTOTRACK_TLE or not seen.is_in_step:
+        return state
+    return _learn_offset(state, seen.reading, sky, config, events)
 
 
 def _learn_offset(

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from acu_daemon.control.changed import changed
 from acu_daemon.control.search import covered_text, go_on, needed_s
-from acu_daemon.control.state import ControlConfig, ControlState, Event, Scan, Sky
+from acu_daemon.control.state import ControlConfig, ControlState, Event, Observation, Scan, Sky
 from acu_daemon.control.states import AUTOTRACKING, TrackState
 from acu_daemon.control.track_frame import extents
 from acu_daemon.model import Prediction
@@ -13,7 +13,13 @@ LONGEST_STEP_S = 0.3  # after a gap in the readings nobody knows what was seen
 
 
 def search(
-    before: ControlState, state: ControlState, sky: Sky, now_tai_s: float, config: ControlConfig, events: list[Event]
+    before: ControlState,
+    state: ControlState,
+    seen: Observation,
+    sky: Sky,
+    now_tai_s: float,
+    config: ControlConfig,
+    events: list[Event],
 ) -> ControlState:
     """Move the scan on; before: the memory one tick ago.
 
@@ -32,7 +38,7 @@ def search(
         state = changed(state, scan=replace(state.scan, is_aimed=False), scanned_tai_s=reading.tai_s)
         events.append(_begins(state.scan, sky.prediction, now_tai_s, config))
     dt_s = reading.tai_s - state.scanned_tai_s
-    if dt_s == 0.0 and was_searching:
+    if was_searching and (dt_s == 0.0 or not seen.is_in_step):
         return state
     scan = go_on(state.scan, sky.prediction, reading, now_tai_s, dt_s if dt_s < LONGEST_STEP_S else 0.0, config)
     if scan.round_count > state.scan.round_count:

@@ -81,7 +81,7 @@ def tick(
     state = watch_turn(state, seen, config, events)
     state = note_held(_walk(forget_other_pass(state, sky), seen, sky, now_tai_s, config, events), config)
     state = learn_of_signal(state, seen, sky, config, events)
-    state = search(before, state, sky, now_tai_s, config, events)
+    state = search(before, state, seen, sky, now_tai_s, config, events)
     is_write_owed = bool(before.commands) and before.commands[-1] is None
     state, orders = _order(state, seen, sky, now_tai_s, config, events, is_write_owed=is_write_owed)
     return fence(state, orders, config)
