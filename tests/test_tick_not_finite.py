@@ -23,7 +23,8 @@ from acu_daemon.protocol.messages import AcuMode, WriteAndPoll, WriteRegisters
 
 FIT = FitResult("full", Correction(), NOW - 5.0, 40, 0, 0.02, 0.5, 0.01)
 SIGMA = np.full(FITTED.prediction.az_deg.size, 0.01)
-SKY = Sky(replace(FITTED.prediction, sigma_deg=SIGMA), FIT, PLAN)
+DRIFT = np.full((2, FITTED.prediction.az_deg.size), 0.01)
+SKY = Sky(replace(FITTED.prediction, sigma_deg=SIGMA, spread=(1.0, 0.1), late_drift_deg_s=DRIFT), FIT, PLAN)
 NOT_FINITE = (nan, inf, -inf, 1e308, -1e300)
 MODES = (AcuMode.AUTOTRACK, AcuMode.REMOTE_BACKUP, AcuMode.REMOTE, AcuMode.STANDBY, AcuMode.ACQUIRE)
 

@@ -88,7 +88,7 @@ def pointing(scan: Scan, prediction: Prediction, tai_s: float, config: ControlCo
 
 def may_look(point: Pointing | None, config: ControlConfig) -> bool:
     """Whether the antenna may point there: above the mask, within the limits."""
-    if point is None:
+    if point is None or not point.is_finite:
         return False
     lowest_deg = max(config.elevation.min_deg, config.min_elevation_deg)
     is_high_enough = lowest_deg <= point.el_deg <= config.elevation.max_deg

@@ -21,7 +21,7 @@ RATE_SPAN_S = 0.05
 def extents(prediction: Prediction | None, config: ControlConfig) -> tuple[float, float]:
     """How far the satellite may be along, s, and across, deg: the search's keys, or 3 sigma where those are more."""
     along_s, across_deg = config.search_along_s, config.search_across_deg
-    if prediction is not None and prediction.spread is not None:
+    if prediction is not None and prediction.spread is not None and all(map(isfinite, prediction.spread)):
         along_s = max(along_s, min(SIGMAS * prediction.spread[0], MOST_ALONG_S))
         across_deg = max(across_deg, min(SIGMAS * prediction.spread[1], MOST_ACROSS_DEG))
     return along_s, across_deg
@@ -63,7 +63,7 @@ def _place(
         index = min(max(index, 0), prediction.el_deg.size - 1)
         right += along_s * float(prediction.late_drift_deg_s[0, index])
         upward += along_s * float(prediction.late_drift_deg_s[1, index])
-    return _moved(point.az_deg, point.el_deg, right, upward)
+    return _moved(point.az_deg, point.el_deg, right, upward) if isfinite(right + upward) else None
 
 
 def _motion(point: Pointing) -> tuple[float, float, float]:
