@@ -4,6 +4,7 @@ import os
 import time
 
 __version__ = "0.1.0"
+RELEASED_UTC = "2026-11-01T00:00:00Z"  # set at packaging: a system clock that is earlier cannot be right
 
 for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):  # numpy reads them; more cost a refit a tenth of its time
     os.environ.setdefault(_threads, "1")

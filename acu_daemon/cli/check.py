@@ -28,7 +28,8 @@ from acu_daemon.config import load_station, satellite_names
 from acu_daemon.config_tables import AcuSection
 from acu_daemon.control.plan import plan_pass
 from acu_daemon.daemon.port import AcuPort
-from acu_daemon.edge.clock import SystemClock, is_clock_synchronised
+from acu_daemon.edge.clock import SystemClock, is_clock_synchronised, system_tai_s
+from acu_daemon.edge.clock_sense import before_elements, before_release
 from acu_daemon.edge.latch import ADVICE, DISARMED, LATCH
 from acu_daemon.edge.link import check_rate, make_link
 from acu_daemon.edge.loop import run_loop
@@ -163,7 +164,9 @@ def _alarms(snapshot: Path) -> list[str]:
 
 
 def clock_finding() -> Finding:
-    """Whether the system clock is synchronised."""
+    """Whether the system clock can be right, and is synchronised."""
+    if wrong := before_release(system_tai_s()):
+        return Finding(NO_GO, "clock", f"{wrong}; `run` waits until then")
     is_synchronised = is_clock_synchronised()
     if is_synchronised:
         return Finding(GO, "clock", "synchronised")
@@ -181,6 +184,10 @@ def _satellite(config: Path, name: str, now_tai_s: float) -> Iterator[Finding]:
         return
     elements = target.elements
     age = f"epoch {utc_text(elements.epoch_tai_s, 0)}, {(now_tai_s - elements.epoch_tai_s) / DAY_S:.1f} days old"
+    is_now = abs(now_tai_s - system_tai_s()) < DAY_S  # not a rehearsal's time
+    if is_now and (wrong := before_elements(elements, now_tai_s, is_clock_synchronised())):
+        yield Finding(NO_GO, f"{name}: elements", f"{wrong}; `run` waits until then")
+        return
     if elements.errors:
         yield Finding(NO_GO, f"{name}: elements", "; ".join(elements.errors))
         return

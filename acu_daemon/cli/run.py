@@ -7,9 +7,8 @@ import gc
 import math
 import os
 import sys
-import time
 from collections.abc import Coroutine
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -19,6 +18,8 @@ import typer
 
 from acu_daemon import PROCESS_START_S
 from acu_daemon.assist.carry_over import CarryOver
+from acu_daemon.cli.clock_wait import wait_for_clock
+from acu_daemon.cli.elements_watch import ElementsWatch
 from acu_daemon.cli.kept import Kept, open_kept
 from acu_daemon.cli.options import (
     At,
@@ -35,12 +36,14 @@ from acu_daemon.cli.options import (
 )
 from acu_daemon.config import control_config, estimator_settings
 from acu_daemon.control.refit import RefitSetup
+from acu_daemon.control.state import ControlState
 from acu_daemon.daemon.background import fit_deadline_s
 from acu_daemon.daemon.health import Health
 from acu_daemon.daemon.live import LiveLine
+from acu_daemon.daemon.runs import Runs
 from acu_daemon.daemon.service import Outcome, PassJob, Service
 from acu_daemon.daemon.snapshot import Snapshot
-from acu_daemon.edge.clock import SystemClock
+from acu_daemon.edge.clock import STEP_S, SystemClock
 from acu_daemon.edge.control_socket import ControlSocket
 from acu_daemon.edge.denied import denied
 from acu_daemon.edge.fit import ProcessFitRunner
@@ -113,13 +116,7 @@ def command(
     keep_to_this_thread()
     check_duration(duration)
     clock = make_clock(at, at_monotonic)
-    target = load_target(config, satellite, clock.tai_s())
-    target = nearest_to_pass(config, satellite, target, clock.tai_s())
-    coming = coming_pass(target, clock.tai_s())
-    link = make_link(target.station.acu.url)
-    check_rate(link, target.station.acu.period_s, target.station.acu.device_delay_s)
-    directory = state_directory(state, is_rehearsal=clock.is_rehearsal)
-    end_tai_s = math.inf if duration is None else clock.tai_s() + duration - (time.monotonic() - PROCESS_START_S)
+    end_s = math.inf if duration is None else PROCESS_START_S + duration
     with contextlib.ExitStack() as ends:
         output, files = Writer("log", on_drained=tell_dropped), Writer("files")
         ends.callback(output.close)
@@ -133,20 +130,72 @@ def command(
             before_line=live.clear if live else None,
             writer=output,
         )
+        if not wait_for_clock(config, satellite, clock, end_s):
+            return
+        target = _load(config, satellite, clock)
+        coming_pass(target, clock.tai_s())
+        link = make_link(target.station.acu.url)
+        check_rate(link, target.station.acu.period_s, target.station.acu.device_delay_s)
+        directory = state_directory(state, is_rehearsal=clock.is_rehearsal)
         recording = ends.enter_context(RecordingWriter(record, files, clock.tai_s())) if record is not None else None
-        _announce(target, coming, clock, is_shadow=shadow)
-        kept = open_kept(directory, target, coming, clock, files)
-        ends.callback(kept.flush)
-        job = make_job(target, coming, link, is_rehearsal=clock.is_rehearsal, end_tai_s=end_tai_s, carried=kept.carried)
-        job = replace(job, control=replace(job.control, is_shadow=shadow))
-        job = replace(job, state=kept.state)
+        frame = Frame(config, satellite, clock, link, directory, files, end_s, shadow)
+        first = prepare(frame, target)
         runner = ends.enter_context(loop_runner())  # where the system denies even that, another start is refused too
-        outcome = _watched(runner, _run(job, link, clock, live, recording, files, kept, directory))
+        outcome = _watched(runner, _run(frame, first, live, recording))
         structlog.get_logger("run").info("run.done", **asdict(outcome))
     if not outcome.is_stopped:
         raise typer.Exit(1)
     if outcome.has_begun and not outcome.has_acquired and outcome.reason not in {number.name for number in STOPS}:
         raise typer.Exit(1)
+
+
+def _load(config: Path, name: str, clock: SystemClock) -> Target:
+    return nearest_to_pass(config, name, load_target(config, name, clock.tai_s()), clock.tai_s())
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """What stays the same from one run of this process to the next.  end_s: of --duration, on CLOCK_MONOTONIC."""
+
+    config: Path
+    name: str
+    clock: SystemClock
+    link: Link
+    directory: Path
+    files: Writer
+    end_s: float
+    is_shadow: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A run that can begin."""
+
+    target: Target
+    job: PassJob
+    kept: Kept
+
+
+def prepare(frame: Frame, target: Target, memory: ControlState | None = None) -> Prepared:
+    """Find the pass and what was left for it.  memory: of the run before, where this one begins anew.
+
+    Raises: UsageError: no pass is coming, or the elements do not cover it.
+    """
+    clock = frame.clock
+    coming = coming_pass(target, clock.tai_s())
+    _announce(target, coming, clock, is_shadow=frame.is_shadow)
+    kept = open_kept(frame.directory, target, coming, clock, frame.files)
+    job = make_job(
+        target,
+        coming,
+        frame.link,
+        is_rehearsal=clock.is_rehearsal,
+        end_tai_s=clock.tai_s() + frame.end_s - clock.monotonic_s(),
+        carried=kept.carried,
+    )
+    job = replace(job, control=replace(job.control, is_shadow=frame.is_shadow))
+    job = replace(job, state=kept.state if memory is None else memory, is_anew=memory is not None)
+    return Prepared(target, job, kept)
 
 
 def _watched(runner: asyncio.Runner, run: Coroutine[Any, Any, Outcome]) -> Outcome:
@@ -218,20 +267,13 @@ def _announce(target: Target, coming: Pass, clock: SystemClock, *, is_shadow: bo
         log.warning("run.disarmed", reason=reason)
 
 
-async def _run(
-    job: PassJob,
-    link: Link,
-    clock: SystemClock,
-    live: LiveLine | None,
-    recording: RecordingWriter | None,
-    files: Writer,
-    kept: Kept,
-    directory: Path,
-) -> Outcome:
+async def _run(frame: Frame, first: Prepared, live: LiveLine | None, recording: RecordingWriter | None) -> Outcome:
+    clock, now = frame.clock, first
     notifier = Notifier()
     health = Health(notifier)
     snapshot_ticks = SNAPSHOT_TICKS if live is None else 1
-    snapshots = SnapshotFile(directory, files, snapshot_ticks)
+    snapshots = SnapshotFile(frame.directory, frame.files, snapshot_ticks)
+    elements = ElementsWatch(frame.config, frame.name, first.target, clock)
 
     def show(seen: Snapshot) -> None:
         health.see(seen)
@@ -240,36 +282,53 @@ async def _run(
             live.show(seen)
 
     def files_alarm() -> str:
-        problems = (files.problem, recording.problem if recording else "", kept.problem)
+        problems = (frame.files.problem, recording.problem if recording else "", now.kept.problem)
         return "; ".join(problem for problem in problems if problem)
 
-    service = Service(
-        job,
-        link,
-        clock,
-        ProcessFitRunner(job.refit, fit_deadline_s(job.low_water_s)),
-        on_snapshot=show,
-        snapshot_ticks=snapshot_ticks,
-        on_reading=recording.add if recording else None,
-        on_fit=kept.offer,
-        on_state=kept.see,
-        on_end=lambda: notifier("STOPPING=1"),  # no tick feeds the watchdog from here on: it lets the daemon stop
-        files_alarm=files_alarm,
-    )
+    def why_anew(is_waiting: bool, step_s: float) -> str:
+        if step_s:
+            return f"the system clock was set by {step_s:+.1f} s, and nothing is tracked"
+        return "other elements were taken" if is_waiting and elements.look(now.job.coming) else ""
+
+    def begin(memory: ControlState | None) -> Service:
+        nonlocal now
+        if memory is not None:
+            now.kept.flush()
+            if abs(clock.follow()) > STEP_S:
+                clock.obey()
+                elements.target = _load(frame.config, frame.name, clock)
+            now = prepare(frame, elements.target, memory)
+        return Service(
+            now.job,
+            frame.link,
+            clock,
+            ProcessFitRunner(now.job.refit, fit_deadline_s(now.job.low_water_s)),
+            on_snapshot=show,
+            snapshot_ticks=snapshot_ticks,
+            on_reading=recording.add if recording else None,
+            on_fit=now.kept.offer,
+            on_state=now.kept.see,
+            on_end=lambda: notifier("STOPPING=1"),  # no tick feeds the watchdog from here on: it lets the daemon stop
+            files_alarm=files_alarm,
+            why_anew=why_anew,
+        )
+
+    runs = Runs(begin)
     loop = asyncio.get_running_loop()
     loop.set_exception_handler(tell_loop_problem)
-    ignored = take_signals(loop, service.stop, tell_signal)
+    ignored = take_signals(loop, runs.stop, tell_signal)
     if ignored:
         reason = "whoever started this daemon ignores them, as nohup does"
         structlog.get_logger("run").info("signals.ignored", signals=ignored, reason=reason)
-    control = ControlSocket(directory, service.answer)
+    control = ControlSocket(frame.directory, runs.answer)
     await control.open()
     gc.freeze()  # a full collection over the start-up heap would stall a tick by tens of milliseconds
     sync = asyncio.create_task(clock.watch_synchronisation())
     try:
-        return await service.run()
+        return await runs.run()
     finally:
         sync.cancel()
+        now.kept.flush()
         await control.close()
         notifier.close()
         if live is not None:

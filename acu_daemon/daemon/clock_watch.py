@@ -1,7 +1,8 @@
 """Watches the clock once a second: a system clock that is not synchronised, stepped, or too far from ours, is an alarm.
 
-UTC follows the system clock slowly (edge.clock).  A step is reported and not obeyed before the next start: in mid-pass
-it would throw the beam off, and nobody can know which of the two clocks is right.
+UTC follows the system clock slowly (edge.clock).  A step is reported.  While the pass is tracked it is not obeyed: it
+would throw the beam off, and what is tracked shows that the old one is right.  Else it is: the run begins anew
+(daemon.runs), as on a machine that was booted with a wrong clock and has it corrected later.
 """
 
 from math import cos, hypot, radians
@@ -24,6 +25,11 @@ class ClockWatch:
         self.alarm = ""
         self.difference_s = 0.0
 
+    @property
+    def step_s(self) -> float:
+        """By how much the system clock has stepped, seconds; 0: it has not."""
+        return self.difference_s if abs(self.difference_s) > STEP_S else 0.0
+
     def look(self, prediction: Prediction | None) -> None:
         """Follow the system clock for one second; prediction: how fast the satellite moves now."""
         self.difference_s = self._clock.follow()
@@ -37,8 +43,9 @@ class ClockWatch:
         self._kind = kind
 
     def _judge(self, rate_deg_s: float) -> tuple[str, str]:
-        if abs(self.difference_s) > STEP_S:
-            return "stepped", f"the system clock stepped by {self.difference_s:+.3f} s: not obeyed until the next start"
+        if self.step_s:
+            stepped = f"the system clock stepped by {self.difference_s:+.3f} s"
+            return "stepped", f"{stepped}: not obeyed while the pass is tracked"
         off_deg = abs(self.difference_s) * rate_deg_s
         if off_deg > self._alarm_deg:
             return "off", f"UTC is off by {self.difference_s:+.3f} s: {off_deg:.3f} deg at the present rate"

@@ -9,10 +9,11 @@ from typing import Any
 import structlog
 
 from acu_daemon.control.approach import lead_s
-from acu_daemon.control.causes import pass_end_tai_s
+from acu_daemon.control.causes import is_tracked, pass_end_tai_s
 from acu_daemon.control.plan import plan_pass
 from acu_daemon.control.refit import RefitSetup
 from acu_daemon.control.state import ControlConfig, ControlState
+from acu_daemon.control.states import ACTIVE
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.background import Background
 from acu_daemon.daemon.foreground import Foreground
@@ -26,6 +27,7 @@ from acu_daemon.errors import NoAcuError, UsageError
 from acu_daemon.model import FitResult, Pass, Reading
 
 FIRST_POLL_S = 10.0  # no good poll within this of the start ends the run
+LOOK_TICKS = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +44,7 @@ class PassJob:
     is_rehearsal: bool = False
     end_tai_s: float = math.inf  # of --duration
     state: ControlState = ControlState()  # what the decision begins with: what the last run left
+    is_anew: bool = False  # not the first run of this daemon: the ACU was there
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +88,13 @@ class Service:
         on_state: Callable[[ControlState], None] | None = None,
         files_alarm: Callable[[], str] = str,
         on_end: Callable[[], None] | None = None,
+        why_anew: Callable[[bool, float], str] | None = None,
     ) -> None:
-        """on_end: called when the run is over, before the safe stop, which may take stopping.DEADLINE_S."""
+        """on_end: called when the run is over, before the safe stop, which may take stopping.DEADLINE_S.
+
+        why_anew: asked once a second, until the pass is acquired, whether the run is to begin anew, and why; is told
+        whether the antenna waits, and by how many seconds the system clock has stepped.
+        """
         self._job = job
         self._clock = clock
         self._runner = runner
@@ -95,6 +103,8 @@ class Service:
         self._on_state = on_state
         self._on_end = on_end
         self._files_alarm = files_alarm
+        self._why_anew = why_anew
+        self.anew_reason = ""  # why the run has ended: another is to follow at once
         self._is_over = asyncio.Event()
         self._stop_reason = ""
         self._started_tai_s = math.inf
@@ -135,15 +145,21 @@ class Service:
                 try:
                     reason = await self._track()
                 finally:
-                    if self._on_end is not None:
-                        self._on_end()
-                    is_stopped = await self._safe_stop()
-                    self._leave(is_stopped=is_stopped)
+                    is_stopped = await self._end()
                     link.cancel()
                     await self._runner.close()
         except ExceptionGroup as group:
             raise _innermost(group) from None
         return self._outcome(reason, is_stopped)
+
+    async def _end(self) -> bool:
+        if self.anew_reason and not self._stop_reason:  # the next run takes the antenna as it is
+            return True
+        if self._on_end is not None:
+            self._on_end()
+        is_stopped = await self._safe_stop()
+        self._leave(is_stopped=is_stopped)
+        return is_stopped
 
     async def _track(self) -> str:
         self._started_tai_s = self._clock.tai_s()
@@ -155,7 +171,7 @@ class Service:
             await self._is_over.wait()
             for task in tasks:
                 task.cancel()
-        return self._stop_reason
+        return self._stop_reason or self.anew_reason
 
     def _supervise(self, now_tai_s: float) -> None:
         """Look after a tick whether the run is over, and plan the pass as soon as it can be planned."""
@@ -170,9 +186,31 @@ class Service:
         self._check_acu(now_tai_s - self._started_tai_s)
         if sky.plan is None or self._area.state.turn.learned_count != self._planned_turns:
             self._plan(now_tai_s)
+        if self._why_anew is not None and self._foreground.tick_count % LOOK_TICKS == 0:
+            self._look_anew(self._why_anew, now_tai_s)
+
+    def _look_anew(self, why_anew: Callable[[bool, float], str], now_tai_s: float) -> None:
+        state, sky = self._area.state, self._area.sky
+        if not is_tracked(state, sky, now_tai_s):
+            self.anew_reason = why_anew(state.track not in ACTIVE, self._foreground.clock_watch.step_s)
+            if self.anew_reason:
+                self._is_over.set()
+
+    @property
+    def memory(self) -> ControlState:
+        """What of this run's memory another one begins with: what people and the antenna have told."""
+        state = self._area.state
+        return ControlState(
+            arming=state.arming,
+            disarmed_by=state.disarmed_by,
+            latch=state.latch,
+            is_stop_due=state.is_stop_due,
+            held=state.held,
+            is_stow_kept=state.is_stow_kept,
+        )
 
     def _check_acu(self, elapsed_s: float) -> None:
-        if self._area.state.status is None and elapsed_s > FIRST_POLL_S:
+        if self._area.state.status is None and elapsed_s > FIRST_POLL_S and not self._job.is_anew:
             why = self._port.problem or "no answer"
             raise NoAcuError(f"no good poll within {FIRST_POLL_S:g} s: {why}")
         identity, is_sure = self._area.state.identity, self._area.state.is_identity_sure

@@ -12,7 +12,7 @@ from typing import Protocol
 from acu_daemon.edge.child_process import start
 from acu_daemon.orbit.timescales import tai_from_unix
 
-STEP_S = 0.1  # a jump of the system clock larger than this is reported and not obeyed
+STEP_S = 0.1  # a jump of the system clock larger than this is reported, and obeyed only where nothing is tracked
 ASK_EVERY_S = 30.0
 FOLLOW_GAIN = 0.02  # of the difference to the system clock, each second: a drift is followed, a step is not
 
@@ -37,6 +37,10 @@ class Clock(Protocol):
 
     def follow(self) -> float:
         """Follow the system's UTC for one second; return its difference to ours, seconds (0 where there is none)."""
+        ...
+
+    def obey(self) -> None:
+        """Take the system's UTC as it is, a step included; not while anything depends on ours."""
         ...
 
     async def sleep_until(self, tai_s: float) -> None: ...
@@ -112,6 +116,10 @@ class SystemClock:
             self._offset_s += FOLLOW_GAIN * difference_s
         return difference_s
 
+    def obey(self) -> None:
+        if not self.is_rehearsal:
+            self._offset_s = _system_offset_s()
+
     async def sleep_until(self, tai_s: float) -> None:
         if self._timer is None and not self._is_timer_denied:
             try:
@@ -153,11 +161,19 @@ class LoopClock:
     def follow(self) -> float:
         return 0.0
 
+    def obey(self) -> None:
+        """There is no other clock."""
+
     async def sleep_until(self, tai_s: float) -> None:
         await asyncio.sleep(max(0.0, tai_s - self.tai_s()))
 
     def close(self) -> None:
         """Nothing to give back."""
+
+
+def system_tai_s() -> float:
+    """TAI by the system clock now."""
+    return tai_from_unix(time.time())
 
 
 def _system_offset_s() -> float:

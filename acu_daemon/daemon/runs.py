@@ -1,0 +1,43 @@
+"""One run after another of the same daemon: begun anew where the clock was set or better elements came, before a pass.
+
+Between two runs the link is closed and opened, and nothing is told the ACU: the antenna stays as it is.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import structlog
+
+from acu_daemon.control.state import ControlState
+from acu_daemon.daemon.service import Outcome, Service
+
+
+class Runs:
+    """begin: makes a run, the first without a memory, each other with that of the one before."""
+
+    def __init__(self, begin: Callable[[ControlState | None], Service]) -> None:
+        self._begin = begin
+        self._service = begin(None)
+        self._stop_reason = ""
+
+    def stop(self, reason: str) -> None:
+        """End the run that goes on, or comes next, early and safely."""
+        self._stop_reason = self._stop_reason or reason
+        self._service.stop(reason)
+
+    def answer(self, line: str) -> str:
+        """Answer a line of the control socket."""
+        return self._service.answer(line)
+
+    async def run(self) -> Outcome:
+        """Run until one has ended for good.  Raises what Service.run and `begin` raise."""
+        log: Any = structlog.get_logger("run")
+        while True:
+            outcome = await self._service.run()
+            if not self._service.anew_reason or self._is_stopping():
+                return outcome
+            log.warning("run.anew", reason=self._service.anew_reason)
+            self._service = self._begin(self._service.memory)
+
+    def _is_stopping(self) -> bool:
+        return bool(self._stop_reason)
