@@ -40,7 +40,7 @@ def test_p7_a_step_while_the_pass_is_tracked_is_not_obeyed(tmp_path: Path) -> No
     told = tell(Story(DEMO, RISE_TAI_S - 5.0, 60.0, actions=actions), tmp_path / "state")
     assert told.named("run.anew") == []
     assert told.snapshots[-1].state == "AUTOTRACK/FITTED"
-    assert "not obeyed while the pass is tracked" in told.snapshots[-1].clock_alarm
+    assert "not obeyed while a pass is tracked" in told.snapshots[-1].clock_alarm
 
 
 def test_what_people_told_the_daemon_before_the_clock_was_set_holds_after_it(tmp_path: Path) -> None:

@@ -45,7 +45,7 @@ class ClockWatch:
     def _judge(self, rate_deg_s: float) -> tuple[str, str]:
         if self.step_s:
             stepped = f"the system clock stepped by {self.difference_s:+.3f} s"
-            return "stepped", f"{stepped}: not obeyed while the pass is tracked"
+            return "stepped", f"{stepped}: not obeyed while a pass is tracked"
         off_deg = abs(self.difference_s) * rate_deg_s
         if off_deg > self._alarm_deg:
             return "off", f"UTC is off by {self.difference_s:+.3f} s: {off_deg:.3f} deg at the present rate"
