@@ -106,7 +106,8 @@ def read_again(config: Path, name: str, old: Target, coming: Pass, now_tai_s: fl
     toml = config / "satellites" / f"{name}.toml"
     try:
         satellite, _ = load_satellite(config, name, load_station(config))
-        elements = load_elements(satellite, toml, now_tai_s, old.station.site.orientation)
+        orientation = old.station.site.orientation
+        elements = load_elements(satellite, toml, now_tai_s, orientation, max(now_tai_s, coming.rise_tai_s))
         if elements.errors:
             raise ElementsError("; ".join(elements.errors))
         changes = {"elements": satellite.elements, "uncertainty": satellite.uncertainty}
