@@ -171,7 +171,6 @@ LIST = [
     [
         (33951, "NOAA 19", "NOAA 19 [+] (33591)"),
         (1, "noaa-19 [+]", "NOAA 19 [+] (33591)"),
-        (None, "NOAA 19", "NOAA 19 [+] (33591)"),
         (None, "NOAA 18 [+]", "NOAA 19 [+] (33591)"),
         (33591 + 10000, "my own", "NOAA 19 [+] (33591)"),
     ],
@@ -185,6 +184,11 @@ def test_a_satellite_that_is_not_in_a_long_list_is_told_with_what_may_be_meant(
     assert str(error.value).endswith(
         "the file holds 288 satellites, such as STARLINK-2000 (46000), STARLINK-2007 (46007)"
     )
+
+
+@pytest.mark.parametrize("name", ["NOAA 19", "noaa-19", "NOAA 19 [+]", "NOAA 19 [-]"])
+def test_the_status_that_a_list_puts_after_a_name_does_not_count(name: str) -> None:
+    assert select_elements(LIST, None, name, NOW).elements.norad_id == 33591
 
 
 def test_nothing_is_suggested_where_nothing_is_near() -> None:

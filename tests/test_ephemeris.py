@@ -7,6 +7,7 @@ import pytest
 import real_passes
 from conftest import needs_data
 from made_oems import NO_ORIENTATION, START, States, iss, kvn, source, states, xml
+from made_orbits import circular
 from real_passes import RealPass, noisy, sky_angles_deg
 from skyfield.api import load
 from skyfield.framelib import ICRS_to_J2000
@@ -216,8 +217,11 @@ def test_a_gap_between_segments_has_no_answer() -> None:
         oem.states_teme(np.array([START + 700.0]))
 
 
-def test_only_a_bounded_source_has_spans() -> None:
-    assert spans_tai_s(iss()) == ((-np.inf, np.inf),)
+def test_only_a_bounded_source_has_an_end_near_by() -> None:
+    assert spans_tai_s(circular()) == ((-np.inf, np.inf),)
+    [(first, last)] = spans_tai_s(iss())  # of SGP4: to where its drag has brought the ISS down
+    assert first < START - 1000 * DAY_S
+    assert last > START + 1000 * DAY_S
 
 
 @pytest.mark.parametrize(

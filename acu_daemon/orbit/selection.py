@@ -1,5 +1,6 @@
 """Which element set of a list is used, and which segments of an ephemeris: by number, by name, nearest in time."""
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -12,6 +13,7 @@ from acu_daemon.units import DAY_S
 
 _NAMED_IN_MESSAGES = 5
 _ALIKE = 0.75  # of get_close_matches
+_STATUS = re.compile(r"\s*\[[-+?A-Z]\]\s*$")
 _VERSIONS = ("1.0", "2.0", "3.0")  # of orbit ephemeris messages, CCSDS 502.0
 
 
@@ -183,4 +185,6 @@ def _contents(sets: Sequence[ElementSet]) -> str:
 
 
 def _plain(name: str) -> str:
+    """Without case, blanks, hyphens, and the status that lists put after a name, such as [+]."""
+    name = _STATUS.sub("", name)
     return "".join(c for c in name.casefold() if c not in " -_")
