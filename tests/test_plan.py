@@ -92,3 +92,25 @@ def test_what_is_left_of_a_pass_may_fit_where_the_whole_does_not() -> None:
     plan = plan_pass(source, site, coming, 180.0, NARROW, after_north)
     assert plan.note == ""
     assert 0.0 <= plan.start_az_deg < 10.0
+
+
+class Counted(BrouwerPropagator):
+    """Counts the times it was asked for."""
+
+    count = 0
+
+    def states_teme(self, tai_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        Counted.count += tai_s.size
+        return super().states_teme(tai_s)
+
+
+def test_the_plan_of_a_satellite_that_does_not_set_for_days_takes_no_longer_than_that_of_a_pass() -> None:
+    still = Counted(BrouwerElements("GEO", 0.0, 42164e3, 1e-4, 1e-3, 0.0, 0.0, 0.0))
+    site = Site(Station("below", 0.0, float(np.degrees(-gmst_rad(np.zeros(1), 0.0)[0])) % 360.0, 0.0))
+    days_s = 3 * 86400.0
+    [coming] = find_passes(still, site, 0.0, days_s, 5.0)
+    assert coming.duration_s == days_s
+    Counted.count = 0
+    plan = plan_pass(still, site, coming, 180.0, AxisLimits(-270.0, 270.0, 20.0, 10.0), 100.0)
+    assert plan.set_tai_s == days_s
+    assert 15000 < Counted.count < 25000

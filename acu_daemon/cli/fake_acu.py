@@ -86,6 +86,8 @@ def command(
         seed=seed,
         address=address_byte(station.acu.address),
     )
+    for text in target.elements.errors:
+        typer.echo(f"warning: {text}", err=True)
     typer.echo(f"SIMULATION of an SA-3842 for {target.elements.label} over {station.station.name}", err=True)
     if listen is not None and pty is not None:
         raise UsageError("--listen and --pty exclude each other")

@@ -9,7 +9,7 @@ from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.pointing.reach import OutOfReach, out_of_reach
 from acu_daemon.pointing.wrap import choose_turn, middle_deg
 
-COARSE_STEP_S, MOST_STEPS = 0.5, 20000
+COARSE_STEP_S, MOST_STEPS = 0.5, 20000  # of these a tenth of a second's work, in the loop
 ANY_ELEVATION = AxisLimits(-90.0, 180.0, 1.0, 1.0)
 STEP_S = 0.25  # fine enough to unwrap the azimuth of a pass 0.1 deg from the zenith
 
@@ -29,7 +29,8 @@ def plan_pass(
     present_az_deg: where the antenna stands, continuous azimuth in the encoder frame.
     """
     start_tai_s = min(max(coming.rise_tai_s, now_tai_s), coming.set_tai_s - 1.0)
-    tai_s = np.arange(start_tai_s, coming.set_tai_s + STEP_S, STEP_S)
+    step_s = max(STEP_S, (coming.set_tai_s - start_tai_s) / MOST_STEPS)  # one that does not set lasts for days
+    tai_s = np.arange(start_tai_s, coming.set_tai_s + step_s, step_s)
     look = look_at(propagator, tai_s, site)
     az_deg = np.degrees(np.unwrap(np.radians(look.az_deg)))
     turn = choose_turn(az_deg, look.el_deg, azimuth, present_az_deg)
