@@ -85,7 +85,7 @@ def test_what_the_keys_say_is_covered_along_first_then_right_and_left_in_turn_wi
         for across_deg in np.arange(-2.0, 2.01, GRID_DEG):
             off_deg = np.hypot((seen[:, 0] - along_s) * RATE_DEG_S, seen[:, 1] - across_deg).min()
             assert off_deg < SEEN_BEAMS * beamwidth_deg
-    assert rows == list(boxes(PATH, config)[0].rows())
+    assert rows == list(boxes(PATH, config)[1].rows())
 
 
 def test_the_path_is_searched_to_both_ends_before_anything_beside_it_and_within_search_s() -> None:
@@ -153,7 +153,7 @@ def test_another_prediction_is_searched_anew() -> None:
 
 def test_the_covariance_widens_what_is_searched_after_what_the_keys_say() -> None:
     wide = replace(PATH, spread=(5.0, 1.2))
-    keys, whole = boxes(wide, CONFIG)
+    _, keys, whole = boxes(wide, CONFIG)
     assert extents(wide, CONFIG) == (15.0, pytest.approx(3.6))
     assert (keys.along_s, whole.along_s, keys.row_count, whole.row_count) == (10.0, 15.0, 3, 5)
     scans = [scan for _, scan, _ in searched(wide, CONFIG, 300.0)]
@@ -161,6 +161,16 @@ def test_the_covariance_widens_what_is_searched_after_what_the_keys_say() -> Non
     assert set(keys.rows()) <= set(beyond.covered)
     assert scans[-1].round_count >= 1
     assert needed_s(Scan(), wide, 0.0, CONFIG)[0] < needed_s(Scan(), wide, 0.0, CONFIG)[1]
+
+
+def test_what_a_good_fit_says_is_searched_before_the_rest_of_what_the_keys_say() -> None:
+    sure = replace(PATH, spread=(0.5, 0.3))
+    scans = [scan for _, scan, _ in searched(sure, CONFIG, 60.0)]
+    far = next(k for k, scan in enumerate(scans) if abs(scan.along_s) > 2.0)
+    assert set(scans[far].covered) == {0, 1, -1}
+    for early_s, late_s in scans[far].covered.values():
+        assert early_s < -1.4
+        assert late_s > 1.4
 
 
 def test_what_is_covered_is_told_in_seconds_and_degrees() -> None:
@@ -215,6 +225,21 @@ def test_a_search_says_what_it_will_not_reach_and_the_next_one_goes_on() -> None
     assert len({event["covered"] for event in ended}) >= 3
     shown = [seen.search for seen in flight.snapshots if seen.state == "SEARCH"]
     assert shown[-1].startswith("-10.")
+
+
+def test_a_search_of_a_minute_covers_all_that_the_keys_say_and_is_taken_up_in_mid_row() -> None:
+    """The second search begins where the first one stopped, in the middle of a row beside the path."""
+    target = demo_target(fallback={"hold_s": 5.0, "search_s": 20.0}, tracking={"estimator": "kalman"})
+    flight = flight_of(target, RISING_TAI_S, 68.0, antenna=RISING_ANTENNA, losses=[(12.0, 70.0)])
+    first, second = [covered(event["covered"]) for event in events_named(flight, "search.ended")][:2]
+    assert min(-first[0], first[1]) > 9.9
+    assert max(-first[2], first[3]) < 2.0
+    assert min(-second[2], second[3]) > 1.8
+
+
+def covered(text: str) -> tuple[float, ...]:
+    """Seconds early and late, degrees left and right, of what a search tells."""
+    return tuple(float(word) for part in text.split(", ")[:2] for word in part.split(" ")[0:3:2])
 
 
 def test_a_place_is_as_far_off_the_path_as_its_seconds_and_degrees_say() -> None:

@@ -8,7 +8,8 @@ steps to both sides, for that is where the satellite most likely is.  The beam m
 and drives allow, and only while the antenna is where it was told; what counts as covered is what the readings show that
 it saw.  Where the mask or a limit is in the way a side waits, and another is looked at meanwhile.
 
-What must be covered comes in two parts: first what the keys say, then what 3 sigma of the prediction say.
+What must be covered comes in parts: first what lies within both the keys and 3 sigma of the prediction, then what the
+keys say, then the rest of the 3 sigma.
 """
 
 from collections.abc import Iterator
@@ -16,7 +17,7 @@ from dataclasses import dataclass, replace
 from math import ceil, cos, hypot, radians
 
 from acu_daemon.control.state import ControlConfig, Scan
-from acu_daemon.control.track_frame import beside, extents, offset_of
+from acu_daemon.control.track_frame import beside, extents, offset_of, three_sigma_of
 from acu_daemon.model import AxisLimits, Pointing, Prediction, Reading
 from acu_daemon.pointing.wrap import nearest_turn
 
@@ -28,6 +29,7 @@ BEHIND_S = 0.3  # of the scan's motion, by which a reading is older than what th
 STEP_SHARE = 0.5  # of the extent along the track: the row on the path grows by so much on one side, then on the other
 ENDS_S = 0.05  # nearer to its end than this a row is covered
 SLOWEST_DEG_S, LEAST_PACE = 0.005, 1e-3
+LEAST_ALONG_S = 1.0  # a row's length to each side
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,12 +52,13 @@ def row_deg(config: ControlConfig) -> float:
     return ROW_BEAMS * config.beamwidth_deg
 
 
-def boxes(prediction: Prediction | None, config: ControlConfig) -> tuple[Box, ...]:
-    """What the keys say, and what the covariance adds."""
-    asked = (config.search_along_s, config.search_across_deg)
-    return tuple(
-        Box(along_s, _row_count(across_deg, config)) for along_s, across_deg in (asked, extents(prediction, config))
-    )
+def boxes(prediction: Prediction | None, config: ControlConfig) -> tuple[Box, Box, Box]:
+    """What keys and covariance both say, what the keys say, and what either says."""
+    keys, most = (config.search_along_s, config.search_across_deg), extents(prediction, config)
+    three_sigma = three_sigma_of(prediction) or keys
+    least = (max(min(three_sigma[0], keys[0]), LEAST_ALONG_S), min(three_sigma[1], keys[1]))
+    first, second, third = (Box(along_s, _row_count(across_deg, config)) for along_s, across_deg in (least, keys, most))
+    return first, second, third
 
 
 def _row_count(across_deg: float, config: ControlConfig) -> int:
@@ -77,7 +80,7 @@ def look(
 
 def pointing(scan: Scan, prediction: Prediction, tai_s: float, config: ControlConfig) -> Pointing | None:
     """What the registers shall hold: the place, never below the mask nor beyond the elevation's limits."""
-    pace = scan.side * pace_s_s(scan, prediction, tai_s, config) if scan.is_aimed else 0.0
+    pace = scan.side * pace_s_s(scan, prediction, tai_s, config) if scan.is_moving else 0.0
     point = look(scan, prediction, tai_s, config, pace=pace)
     if point is None:
         return None
@@ -101,6 +104,7 @@ def go_on(
     """Look on by what a reading shows; dt_s: since the one before it, 0 where that is too long ago."""
     if scan.model is not prediction.model:
         scan = Scan(model=prediction.model)
+    scan = replace(scan, is_moving=False)
     if scan.is_aimed and scan.side:
         seen = offset_of(prediction, reading.tai_s, reading.az_deg, reading.el_deg)
         if seen is not None:
@@ -121,7 +125,7 @@ def _grown(
     early_s, late_s = scan.covered.get(scan.row, (scan.along_s, scan.along_s))
     covered = (min(early_s, seen[0]), max(late_s, seen[0]))
     scan = replace(scan, rows=tuple(sorted((scan.covered | {scan.row: covered}).items())))
-    moved = replace(scan, along_s=scan.along_s + scan.side * dt_s * pace)
+    moved = replace(scan, along_s=scan.along_s + scan.side * dt_s * pace, is_moving=True)
     return moved if may_look(look(moved, prediction, tai_s, config), config) else replace(scan, is_aimed=False)
 
 
@@ -228,7 +232,7 @@ def needed_s(scan: Scan, prediction: Prediction, tai_s: float, config: ControlCo
     """About how long the rest takes at the present pace, ways between left out: of what the keys say, and of all."""
     on_path = Scan(side=-1)
     pace = max(pace_s_s(on_path, prediction, tai_s, config), LEAST_PACE)
-    keys, whole = boxes(prediction, config)
+    _, keys, whole = boxes(prediction, config)
     return _open_s(scan, (keys,)) / pace, _open_s(scan, (keys, whole)) / pace
 
 

@@ -105,6 +105,7 @@ class Scan:
     side: int = 0  # -1 early, 1 late, 0: none can be looked at now
     along_s: float = 0.0
     is_aimed: bool = False
+    is_moving: bool = False  # the antenna is there, and the place moves on
     round_count: int = 0  # how often all was covered
 
     @property

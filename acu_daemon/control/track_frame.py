@@ -20,11 +20,15 @@ RATE_SPAN_S = 0.05
 
 def extents(prediction: Prediction | None, config: ControlConfig) -> tuple[float, float]:
     """How far the satellite may be along, s, and across, deg: the search's keys, or 3 sigma where those are more."""
-    along_s, across_deg = config.search_along_s, config.search_across_deg
-    if prediction is not None and prediction.spread is not None and all(map(isfinite, prediction.spread)):
-        along_s = max(along_s, min(SIGMAS * prediction.spread[0], MOST_ALONG_S))
-        across_deg = max(across_deg, min(SIGMAS * prediction.spread[1], MOST_ACROSS_DEG))
-    return along_s, across_deg
+    three_sigma = three_sigma_of(prediction) or (0.0, 0.0)
+    return max(config.search_along_s, three_sigma[0]), max(config.search_across_deg, three_sigma[1])
+
+
+def three_sigma_of(prediction: Prediction | None) -> tuple[float, float] | None:
+    """3 sigma along and across, as far as can be searched; None where there is no sigma."""
+    if prediction is None or prediction.spread is None or not all(map(isfinite, prediction.spread)):
+        return None
+    return min(SIGMAS * prediction.spread[0], MOST_ALONG_S), min(SIGMAS * prediction.spread[1], MOST_ACROSS_DEG)
 
 
 def is_within(offset: tuple[float, float] | None, most: tuple[float, float]) -> bool:
