@@ -48,6 +48,7 @@ GROUPS: dict[str, Group] = {
         "Keep a phased satellite's ground track: simulate it (seed 003), or see it in element sets and in passes.",
         {
             "simulate": ("groundtrack_simulate", "command"),
+            "reproduce": ("groundtrack_reproduce", "command"),
             "from-elements": ("groundtrack_elements", "command"),
         },
     ),

@@ -63,3 +63,26 @@ class PaperController:
         self._smoother.restart()
         self._rested_s = 0.0
         return size_m
+
+
+class ConstantController:
+    """The controller of Galski et al. 2001 as seed 003 describes it: steps of one size, at most one in a revolution.
+
+    Where it aims is not said; here at D = 0: a step is made while smoothed D is east of it and drifts further east.
+    """
+
+    def __init__(self, size_m: float, reference: ReferenceOrbit, step_s: float, window_d_s: float) -> None:
+        """Take the size; D and dD/dt are smoothed over the same window, and restarted by a step."""
+        self._size_m, self._step_s, self._rest_s = size_m, step_s, max(reference.revolution_s, window_d_s / 2.0)
+        self._smoother = DriftSmoother(step_s, window_d_s, window_d_s)
+        self._rested_s = 0.0
+
+    def observe(self, step: int, d_m: float) -> float:
+        """Take the observation of a step; the size of the manoeuvre to make now in metres, 0 for none."""
+        smooth_m, rate_m_s = self._smoother.add(d_m)
+        self._rested_s += self._step_s
+        if self._rested_s < self._rest_s or smooth_m <= 0.0 or rate_m_s <= 0.0:
+            return 0.0
+        self._smoother.restart()
+        self._rested_s = 0.0
+        return self._size_m

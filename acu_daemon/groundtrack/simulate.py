@@ -21,16 +21,17 @@ from acu_daemon.groundtrack.gps import Ripple, TrueOrbit
 from acu_daemon.groundtrack.loop import Controller, Flown, OrbitNavigator, fly
 from acu_daemon.groundtrack.navigator import Navigator, NavigatorSetup
 from acu_daemon.groundtrack.our_controller import FORECAST_S, Forecast, OurController, OurSettings
-from acu_daemon.groundtrack.paper_controller import PaperController, PaperSettings
+from acu_daemon.groundtrack.paper_controller import ConstantController, PaperController, PaperSettings
 from acu_daemon.groundtrack.paper_navigator import PaperNavigator
 from acu_daemon.groundtrack.polynomials import DriftPolynomials, drag_forecast, fit_polynomials
 from acu_daemon.groundtrack.smoothing import RECURSION, WINDOW
 from acu_daemon.units import DAY_S, Array
 
-PAPER, OURS, PERFECT = "paper", "ours", "perfect"
-CONTROLLERS, NAVIGATORS = (OURS, PAPER), (OURS, PAPER, PERFECT)
+PAPER, OURS, PERFECT, CONSTANT = "paper", "ours", "perfect", "constant"
+CONTROLLERS, NAVIGATORS = (OURS, PAPER, CONSTANT), (OURS, PAPER, PERFECT)
 SHAPE_DEGREE = 8  # of the logarithm's polynomial over fluxes from 0 on; the paper's degree is enough from 65 on
 DENSITY_TIME_DAYS = 20.0  # how long a departure of the true density from the model lasts
+CONSTANT_WINDOW_S = 3.0 * 3600.0
 _FORECAST_SPARE_DAYS = FORECAST_S / DAY_S
 
 
@@ -55,10 +56,10 @@ class PaperRun(NamedTuple):
 
 
 PAPER_RUNS = (
-    PaperRun("moderate", 3900.0, Windows(3.0, 6.0), 17, 2092.4, 175.9, 45.0, 0.30),
-    PaperRun("moderate", 100.0, Windows(8.0, 20.0), 146, 2178.7, 23.9, 6.1, 0.55),
-    PaperRun("critical", 3900.0, Windows(8.0, 40.0), 26, 2953.0, 324.5, 21.7, 0.25),
-    PaperRun("critical", 100.0, Windows(8.0, 25.0), 148, 2946.7, 64.0, 3.6, 0.55),
+    PaperRun("moderate", 3900.0, Windows(3.0, 6.0), 17, 2092.4, 175.9, 45.0, 0.35),
+    PaperRun("moderate", 100.0, Windows(8.0, 20.0), 146, 2178.7, 23.9, 6.1, 0.60),
+    PaperRun("critical", 3900.0, Windows(8.0, 40.0), 26, 2953.0, 324.5, 21.7, 0.30),
+    PaperRun("critical", 100.0, Windows(8.0, 25.0), 148, 2946.7, 64.0, 3.6, 0.50),
 )
 
 
@@ -78,6 +79,7 @@ class Case:
     windows: Windows | None = None  # of the paper's controller; None: as the paper has them for a like run
     smoothing: str = RECURSION
     has_semi_annual: bool = True
+    constant_m: float = 3.0  # of the constant controller's steps
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,6 +189,8 @@ def _controller(world: World, case: Case) -> Controller:
             OurSettings(case.band_m, -case.band_m, case.execution_sigma), reference, Forecast(STEP_S, drag, sky)
         )
     windows = case.windows or paper_windows(case.profile, case.band_m)
+    if case.controller == CONSTANT:
+        return ConstantController(case.constant_m, reference, STEP_S, CONSTANT_WINDOW_S)
     settings = PaperSettings(
         case.band_m,
         -case.band_m,

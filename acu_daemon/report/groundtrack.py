@@ -36,6 +36,20 @@ def plot_run(path: Path, outcome: Outcome) -> None:
     figure.savefig(path)
 
 
+def plot_paper_run(path: Path, runs: dict[str, Outcome], title: str) -> None:
+    """D and sizes of several controllers over the same year, a column each; writes a PNG."""
+    figure = _figure((5.2 * max(2, len(runs)), 5.6))
+    figure.suptitle(f"SIMULATION, {title}", fontweight="bold")
+    grid = figure.subplots(2, len(runs), sharex=True, squeeze=False, height_ratios=(2.0, 1.0))
+    for column, (label, outcome) in enumerate(runs.items()):
+        above, below = grid[:, column]
+        above.set_title(f"{label}\n{len(outcome.flown.manoeuvres)} manoeuvres", fontsize=8)
+        draw_drift(above, outcome)
+        draw_sizes(below, outcome)
+        below.set_xlabel("days")
+    figure.savefig(path)
+
+
 def draw_drift(axes: Axes, outcome: Outcome) -> None:
     """True D, D as seen behind it, and the band."""
     flown, thin = outcome.flown, slice(0, None, _SHOWN_STEPS)
