@@ -50,6 +50,7 @@ GROUPS: dict[str, Group] = {
             "simulate": ("groundtrack_simulate", "command"),
             "reproduce": ("groundtrack_reproduce", "command"),
             "from-elements": ("groundtrack_elements", "command"),
+            "from-passes": ("groundtrack_passes", "command"),
         },
     ),
     "onboard": Group(

@@ -55,10 +55,17 @@ class OurSettings:
 class DriftFilter:
     """State (D, dD/dt, f) and its covariance (3, 3), at a step of the forecast.  Mutable; belongs to one owner."""
 
-    def __init__(self, forecast: Forecast) -> None:
+    def __init__(
+        self,
+        forecast: Forecast,
+        first_sigma: tuple[float, float, float] = FIRST_SIGMA,
+        share_time_s: float = SHARE_TIME_S,
+    ) -> None:
+        """Begin at zero with these sigmas of D (m), dD/dt (m/s) and f; f returns to 0 with the time given."""
         self.forecast = forecast
         self.state = np.zeros(3)
-        self.covariance = np.diag(np.square(FIRST_SIGMA))
+        self.covariance = np.diag(np.square(first_sigma))
+        self._share_sigma, self._share_time_s = first_sigma[2], share_time_s
         self._speed = [running_integral(one, forecast.step_s) for one in (forecast.drag_m_s2, forecast.lunisolar_m_s2)]
         self._path = [running_integral(one, forecast.step_s) for one in self._speed]
 
@@ -76,11 +83,11 @@ class DriftFilter:
         t = (end - start) * self.forecast.step_s
         drag_m, sky_m = (float(one[0]) for one in self.path(start, np.array([end])))
         drag_m_s, sky_m_s = (float(speed[end] - speed[start]) for speed in self._speed)
-        fade = exp(-t / SHARE_TIME_S)
+        fade = exp(-t / self._share_time_s)
         f = np.array([[1.0, t, drag_m], [0.0, 1.0, drag_m_s], [0.0, 0.0, fade]])
         self.state = f @ self.state + np.array([drag_m + sky_m, drag_m_s + sky_m_s, 0.0])
         walk = RATE_WALK_M_S15**2 * t
-        noise = np.diag([walk * t * t / 3.0, walk, SHARE_SIGMA**2 * (1.0 - fade**2)])
+        noise = np.diag([walk * t * t / 3.0, walk, self._share_sigma**2 * (1.0 - fade**2)])
         noise[0, 1] = noise[1, 0] = walk * t / 2.0
         self.covariance = f @ self.covariance @ f.T + noise
 
@@ -105,7 +112,7 @@ class DriftFilter:
         steps = np.arange(start, last + 1, stride)
         elapsed_s = even_steps(0.0, stride * forecast.step_s, steps.size)
         d_m, rate_m_s, share = self.state
-        drag = forecast.drag_m_s2[steps] * (1.0 + share * np.exp(-elapsed_s / SHARE_TIME_S))
+        drag = forecast.drag_m_s2[steps] * (1.0 + share * np.exp(-elapsed_s / self._share_time_s))
         made_m = running_integral(
             running_integral(drag + forecast.lunisolar_m_s2[steps], stride * forecast.step_s), stride * forecast.step_s
         )

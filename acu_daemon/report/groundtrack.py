@@ -1,7 +1,6 @@
 """Pictures of ground-track keeping."""
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
 from pathlib import Path
 
 import matplotlib as mpl
@@ -12,6 +11,7 @@ from matplotlib.figure import Figure
 from acu_daemon.groundtrack.environment import EPOCH_TAI_S, STEP_S, Flux, even_steps
 from acu_daemon.groundtrack.history import History
 from acu_daemon.groundtrack.kinks import FoundManoeuvre
+from acu_daemon.groundtrack.outlook import Outlook
 from acu_daemon.groundtrack.simulate import Outcome
 from acu_daemon.orbit.timescales import unix_from_tai
 from acu_daemon.units import DAY_S, Array
@@ -113,12 +113,46 @@ def plot_history(path: Path, history: History, found: Sequence[FoundManoeuvre], 
     below.vlines(when, 0.0, [one.delta_a_m for one in found], color=SIZE, linewidth=1.4)
     below.axhline(0.0, color=SEEN, linewidth=0.6)
     below.set_ylabel("Δa found, m")
+    below.xaxis_date()
     figure.savefig(path)
 
 
-def dates(tai_s: Array) -> list[datetime]:
-    """For an axis of time."""
-    return [datetime.fromtimestamp(unix_from_tai(float(one)), UTC) for one in tai_s]
+def plot_outlook(
+    path: Path, history: History, sigma_m: Array, found: Sequence[FoundManoeuvre], ahead: Outlook, title: str
+) -> None:
+    """D from passes with its sigmas, the manoeuvres found, and what D will do; writes a PNG."""
+    figure = _figure((10.0, 5.0))
+    cycle = history.reference.cycle
+    figure.suptitle(f"{title}: {cycle.revolutions} revolutions in {cycle.days} days", fontweight="bold")
+    axes = figure.subplots()
+    axes.errorbar(
+        dates(history.tai_s),
+        history.d_m,
+        sigma_m,
+        fmt=".",
+        color=TRUE,
+        ecolor=SEEN,
+        elinewidth=0.8,
+        label="passes, 1 σ",
+    )
+    until = int(np.searchsorted(ahead.ahead_tai_s, (ahead.next_tai_s or ahead.tai_s) + 10.0 * DAY_S))
+    axes.plot(
+        dates(ahead.ahead_tai_s[:until]), ahead.ahead_m[:until], color=SIZE, linewidth=1.2, label="if nobody steers"
+    )
+    for one in found:
+        axes.axvline(dates(np.array([one.tai_s]))[0], color=LIMIT, linewidth=0.8)
+    if ahead.limit_m is not None:
+        axes.axhline(ahead.limit_m, color=LIMIT, linewidth=0.8, linestyle="--", label="next manoeuvre")
+    axes.set_ylabel("D, m (east positive, median 0)")
+    axes.legend(fontsize=8)
+    axes.xaxis_date()
+    figure.autofmt_xdate()
+    figure.savefig(path)
+
+
+def dates(tai_s: Array) -> Array:
+    """Matplotlib's days, for an axis of dates (`xaxis_date`)."""
+    return np.array([unix_from_tai(one) / DAY_S for one in tai_s.tolist()])
 
 
 def _figure(size_in: tuple[float, float]) -> Figure:
