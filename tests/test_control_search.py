@@ -134,6 +134,12 @@ def test_an_antenna_that_does_not_come_covers_nothing() -> None:
     assert {scan.rows for _, scan, _ in aside} == {()}
 
 
+def test_an_antenna_that_stays_a_quarter_of_a_beam_aside_does_not_end_the_search() -> None:
+    aside = searched(PATH, CONFIG, 90.0, antenna=lambda point: (point.az_deg, point.el_deg - 0.25))
+    *_, (_, scan, _) = aside
+    assert {0, 1, -1} <= set(scan.covered)
+
+
 def test_a_search_that_is_taken_up_again_goes_on_where_it_was() -> None:
     whole = [scan for _, scan, _ in searched(PATH, CONFIG, 30.0)]
     again = [scan for _, scan, _ in searched(PATH, CONFIG, 5.0, replace(whole[-1], is_aimed=False))]

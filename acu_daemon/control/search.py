@@ -25,6 +25,7 @@ ROW_BEAMS = 0.7  # from row to row: what lies between two is 0.35 beams off at m
 DWELL_S = 1.25  # the beam moves by its width in so long: what it crosses at its edge stays in it for 8 readings
 DRIVE_SHARE = 0.8  # of the drive's rate, for path and scan together
 ON_PLACE_BEAMS = 0.15  # the antenna is where it was told: with the half of a row's distance that is half a beam
+PATIENCE_S, LEAST_BEAMS = 10.0, 0.5  # one that never comes so near shall not end the search: half a beam has to do
 BEHIND_S = 0.3  # of the scan's motion, by which a reading is older than what the registers hold
 STEP_SHARE = 0.5  # of the extent along the track: the row on the path grows by so much on one side, then on the other
 ENDS_S = 0.05  # nearer to its end than this a row is covered
@@ -117,11 +118,11 @@ def _grown(
 ) -> Scan:
     """The row in hand, longer by what the antenna has seen of it, and the place moved on where the antenna is near."""
     pace, sky_deg_s = pace_s_s(scan, prediction, tai_s, config), _sky_deg_s(look(scan, prediction, tai_s, config))
-    near_deg = ON_PLACE_BEAMS * config.beamwidth_deg
+    near_deg = (ON_PLACE_BEAMS if scan.waited_s < PATIENCE_S else LEAST_BEAMS) * config.beamwidth_deg
     is_on_row = abs(seen[1] - scan.row * row_deg(config)) < near_deg
     behind_deg = abs(scan.along_s - seen[0]) * sky_deg_s - pace * BEHIND_S * sky_deg_s
     if not is_on_row or behind_deg > near_deg:
-        return scan
+        return replace(scan, waited_s=scan.waited_s + dt_s)
     early_s, late_s = scan.covered.get(scan.row, (scan.along_s, scan.along_s))
     covered = (min(early_s, seen[0]), max(late_s, seen[0]))
     scan = replace(scan, rows=tuple(sorted((scan.covered | {scan.row: covered}).items())))
@@ -158,7 +159,7 @@ def _aimed(scan: Scan, prediction: Prediction, tai_s: float, config: ControlConf
     for row, side, edge_s in _open(scan, asked):
         if scan.is_aimed and (row, side) == (scan.row, scan.side):
             return scan
-        aimed = replace(scan, row=row, side=side, along_s=edge_s, is_aimed=True)
+        aimed = replace(scan, row=row, side=side, along_s=edge_s, is_aimed=True, waited_s=0.0)
         if may_look(look(aimed, prediction, tai_s, config), config) and _may_grow(aimed, prediction, tai_s, config):
             return aimed
     if is_done(scan, asked):

@@ -106,6 +106,7 @@ class Scan:
     along_s: float = 0.0
     is_aimed: bool = False
     is_moving: bool = False  # the antenna is there, and the place moves on
+    waited_s: float = 0.0  # for the antenna to come to the row
     round_count: int = 0  # how often all was covered
 
     @property
