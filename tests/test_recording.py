@@ -75,6 +75,15 @@ def test_a_reading_not_later_than_the_one_before_as_written_is_left_out(tmp_path
     assert len(read_readings(path)) == 2
 
 
+def test_where_the_clock_is_set_back_another_file_is_begun_beside(tmp_path: Path) -> None:
+    path = tmp_path / "pass.csv"
+    with RecordingWriter(path) as recording:
+        for tai_s in (1000.0, 1000.1, 400.0, 400.1, 400.05, 400.2):
+            recording.add(Reading(tai_s, 10.0, 20.0, True))
+    times = [[tai_s for _, _, tai_s in read_readings(one)] for one in (path, tmp_path / "pass-2.csv")]
+    assert times == [pytest.approx([1000.0, 1000.1]), pytest.approx([400.0, 400.1, 400.2])]
+
+
 def test_lines_are_in_the_file_at_least_once_a_second_of_readings(tmp_path: Path) -> None:
     path = tmp_path / "x.csv"
     with RecordingWriter(path) as recording:

@@ -134,6 +134,7 @@ class Foreground:
         port.drop_if_silent(LINK_SILENCE_S)
         first = port.take_first()
         if first is not None and isinstance(first.reply, Status):
+            self._status_s = self._clock.monotonic_s()
             self._take_status(first, first.reply, Poll())
         requests, self._requests = self._requests, ()
         seen = changed(

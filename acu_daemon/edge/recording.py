@@ -7,6 +7,7 @@ import os
 import stat
 from collections.abc import Callable
 from functools import partial
+from itertools import count
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -19,6 +20,7 @@ from acu_daemon.model import Reading
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 
 HEADER = ["utc", "az_deg", "el_deg", "locked"]
+SET_BACK_US = 1e6
 SYNC_S = 1.0  # a line is on the disk no later than this after its reading, while readings come
 _HEADER_LINE = ",".join(HEADER) + "\n"
 _TAIL_BYTES = 4096  # the last line lies within
@@ -29,7 +31,7 @@ class RecordingWriter:
 
     With a writer the loop never waits for the disk.  Where a write fails (a full disk) lines are left out until one
     succeeds again, with a log line at each edge; a failed write never stops a pass.  A recording that exists already is
-    continued, as after a restart.
+    continued, as after a restart.  Times must rise in a file: where the clock was set back, another is begun beside it.
     """
 
     def __init__(self, path: Path, writer: Writer | None = None, now_tai_s: float = math.inf) -> None:
@@ -76,15 +78,30 @@ class RecordingWriter:
     def add(self, reading: Reading) -> None:
         """Write one reading; a reading not later than the one before is left out, since times must rise."""
         time_us = round(reading.tai_s * 1e6)
-        if time_us <= self._last_us:
+        if self._last_us - time_us > SET_BACK_US:
+            self._do(self._begin_beside)
+        elif time_us <= self._last_us:
             return
         self._last_us = time_us
         utc = utc_text(reading.tai_s, 6)
         line = f"{utc},{reading.az_deg:.5f},{reading.el_deg:.5f},{int(reading.is_locked)}\n"
-        if self._writer is None:
-            self._write(line, reading.tai_s)
-        elif not self._writer.put(partial(self._write, line, reading.tai_s)):
+        if not self._do(partial(self._write, line, reading.tai_s)):
             self._lose("the disk does not keep up")
+
+    def _do(self, job: Callable[[], None]) -> bool:
+        """Have it done, in order.  False: dropped."""
+        if self._writer is not None:
+            return self._writer.put(job)
+        job()
+        return True
+
+    def _begin_beside(self) -> None:
+        old = self._path
+        names = (old.with_name(f"{old.stem}-{number}{old.suffix}") for number in count(2))
+        self._path = next(name for name in names if not name.exists())
+        self._log.warning("record.beside", file=str(self._path), reason=f"the clock was set back, {old.name} ends")
+        self._close()
+        self._fd, self._has_header, self._synced_tai_s = -1, False, -math.inf
 
     def _write(self, line: str, tai_s: float) -> None:
         try:
