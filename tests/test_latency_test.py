@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import acu_daemon
-from config_files import STATION
+from config_files import STATION, write
 from real_acu import real_acu
 
-from acu_daemon.cli.latency_test import fits, histogram
+from acu_daemon.cli.latency_test import _link, fits, histogram
+from acu_daemon.config import load_station
 from acu_daemon.daemon.lateness import Lateness
+from acu_daemon.daemon.trial import Trial
 from acu_daemon.edge.link import make_link
 from acu_daemon.protocol.messages import Poll
 
@@ -45,6 +47,14 @@ def test_what_fits_at_9600_baud_is_the_icds_table(latency_ms: int, one_ms: float
     assert f"WRITE AND STATUS {one_ms:.1f} of 95 ms" in finding.detail
     assert f"{both_ms:.1f} ms" in finding.detail
     assert ("does not fit" in finding.detail) == (both_ms > 95.0)
+
+
+def test_a_line_whose_replies_all_come_too_late_is_no_go(tmp_path: Path) -> None:
+    station = load_station(write(tmp_path))
+    late = Trial(link_problem="open, but all replies come too late: up to 150 ms", late="up to 150 ms")
+    dead = Trial(link_problem="nobody listens")
+    link = make_link(station.acu.url)
+    assert [next(_link(trial, station, link)).verdict for trial in (late, dead)] == ["NO-GO", "SKIP"]
 
 
 def test_a_line_too_slow_for_a_write_each_period_is_no_go() -> None:

@@ -171,7 +171,8 @@ def _link(trial: Trial, station: StationFile | None, link: Link | None) -> Itera
         yield Finding(SKIP, "link", "no --config: no ACU is known")
         return
     if trial.link_problem or not trial.round_trips_s:
-        yield Finding(SKIP, "link", "; ".join(trial.link_problem.splitlines()) or "no poll was answered")
+        verdict = NO_GO if trial.late else SKIP
+        yield Finding(verdict, "link", "; ".join(trial.link_problem.splitlines()) or "no poll was answered")
         yield fits(link, station.acu.period_s, station.acu.device_delay_s, "as configured")
         return
     trips_ms = np.sort(1e3 * np.array(trial.round_trips_s))

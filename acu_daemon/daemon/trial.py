@@ -64,6 +64,7 @@ async def _open(trial: Trial, port: AcuPort) -> AcuPort | None:
         await port.open(tries_all=True)
     except LinkError as error:
         trial.link_problem = str(error)
+        trial.late = port.lateness if port.late_count else ""
         return None
     return port
 
