@@ -136,6 +136,14 @@ def test_a_satellite_that_decays_in_days_has_its_passes_until_then(tmp_path: Pat
     assert known.err == ""
 
 
+def test_a_search_that_begins_before_anything_is_known_says_so(tmp_path: Path) -> None:
+    directory = config(tmp_path, ECCENTRIC, EQUATOR)
+    done = acu_daemon("passes", "--config", directory, "--from", "2018-10-20T00:00:00Z", "--days", 3)
+    assert done.code == 0
+    assert "warning: sat: before 2018-10-2" in done.err
+    assert acu_daemon("passes", "--config", directory, "--from", "2018-10-10T00:00:00Z").code == 2
+
+
 def test_two_days_before_the_decay_the_next_pass_is_go_and_the_decay_a_warning(tmp_path: Path) -> None:
     done = acu_daemon("check", "--config", config(tmp_path, ECCENTRIC, EQUATOR), "--at", "2018-11-09T08:00:00Z")
     assert "GO     sat: next pass         2018-11-09T08:44" in done.out

@@ -81,6 +81,7 @@ def passes(directory: Path, *more: object) -> Done:
         ("[]", "an empty JSON answer: no satellite fits what was asked"),
         ('{"error": "cut', 'JSON that cannot be read, not elements: \'{"error": "cut\''),
         ("<?xml version='1.0'?><error>No GP data</error>", "XML, but no elements: 'No GP data'"),
+        ("<html><body>MEAN_MOTION is a field of CCSDS_OMM</body></html>", "a web page, not elements: 'MEAN_MOTION is"),
         ("No GP data found\r\n", "a notice, not elements: 'No GP data found'"),
         (gzip.compress(ISS.encode()), "a gzip archive: unpack it with gunzip; a file of elements is text"),
         (b"PK\x03\x04rest", "a zip archive: unpack it"),

@@ -74,6 +74,8 @@ def test_any_line_ends_and_any_form_of_the_name_are_read(end: str, name: tuple[s
         (("No GP data found",), "line 1: 'No GP data found' is neither an element line nor the name of a set below it"),
         ((ONE, edited(TWO, 9, " 5x.6412")), "line 2: inclination (columns 9-16) is '5x.6412', not a number"),
         ((ONE, edited(TWO, 9, "190.6412")), "line 2: inclination 190.6412 deg; it must lie in 0..180"),
+        ((ONE, edited(TWO, 27, "       ")), "line 2: eccentricity (columns 27-33) is '       ', not 7 digits"),
+        ((edited(ONE, 19, "  "), TWO), "line 1: epoch year (columns 19-20) is '  ', not 2 digits"),
         ((ONE, edited(TWO, 27, "0.00567")), "line 2: eccentricity (columns 27-33) is '0.00567', not 7 digits"),
         ((ONE, edited(TWO, 53, "        nan")), "line 2: mean motion (columns 53-63) is 'nan', not a number"),
         ((ONE, edited(TWO, 53, " 0.00000000")), "line 2: mean motion 0.0 revolutions a day; it must be positive"),
@@ -165,6 +167,8 @@ def small(line: str) -> str:
         (ONE.replace("22041.55493323  .", "22041.55493323\t ."), TWO),
         (ONE.replace(" ", "\t", 2), TWO.replace(" ", "\t", 1)),
         (ONE + "\x1a", TWO + "\x1a"),
+        ("\ufeff" + ONE.replace("-", "\u2212"), "\ufeff" + TWO),
+        (ONE.replace("-", "\u2013"), TWO),
     ],
 )
 def test_sets_are_read_as_people_have_them(one: str, two: str) -> None:

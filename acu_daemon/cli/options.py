@@ -154,6 +154,17 @@ def ending(target: Target, end_tai_s: float) -> str:
     return f"the ephemeris ends at {utc_text(last_tai_s, 0)}"
 
 
+def beginning(target: Target, start_tai_s: float) -> str:
+    """Say that nothing is known of an element set's satellite at the start of a search; empty where something is."""
+    propagator = target.elements.propagator
+    first_tai_s = spans_tai_s(propagator)[0][0]
+    if propagator.kind == "oem" or first_tai_s <= start_tai_s:
+        return ""
+    return (
+        f"before {utc_text(first_tai_s, 0)} nothing is known: so far back from their epoch the elements give no orbit"
+    )
+
+
 def not_covered(target: Target, coming: Pass, now_tai_s: float) -> str:
     """Say what an ephemeris lacks for a pass; empty for other elements and where it lacks nothing."""
     tracking = target.station.tracking

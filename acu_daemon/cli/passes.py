@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from acu_daemon.cli.options import Config, cut_passes, ending, gaps, load_target, open_ends, parse_utc
+from acu_daemon.cli.options import Config, beginning, cut_passes, ending, gaps, load_target, open_ends, parse_utc
 from acu_daemon.config import load_station, satellite_names
 from acu_daemon.control.plan import beyond_limits
 from acu_daemon.edge.clock import SystemClock
@@ -97,6 +97,8 @@ def _search(config: Path, name: str, start_tai_s: float, end_tai_s: float) -> _S
     said = [f"warning: {text}" for text in [*target.elements.errors, *target.elements.warnings]]
     if target.elements.choice:
         said.append(f"note: {target.elements.choice}")
+    if since := beginning(target, start_tai_s):
+        said.append(f"warning: {name}: {since}")
     if until := ending(target, end_tai_s):
         said.append(f"warning: {name}: {until}, no pass is looked for after that")
     lowest_deg = target.station.station.min_elevation_deg

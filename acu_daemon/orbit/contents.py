@@ -33,7 +33,7 @@ def binary_kind(data: bytes) -> str:
 
 def decoded(data: bytes) -> str:
     """The text of a file, in UTF-8 or, as its byte order mark says, UTF-16; what cannot be read is marked."""
-    text = data.decode(_UTF_16.get(data[:2], "utf-8"), errors="replace").removeprefix("\ufeff")
+    text = data.decode(_UTF_16.get(data[:2], "utf-8"), errors="replace").replace("\ufeff", "")
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
@@ -41,6 +41,8 @@ def kind_of(text: str) -> FileKind | None:
     """The format by the words that only it has; None where it has none of them."""
     if _TLE.search(text):
         return "tle"
+    if _PAGE.search(text[:2000]):
+        return None  # one that tells of a format has its words
     if _OEM.search(text):
         return "oem"
     return "omm" if _OMM.search(text) else None

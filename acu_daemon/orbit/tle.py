@@ -27,6 +27,9 @@ _LEAST_DIGITS = 20  # of a whole line: a template of the format has fewer
 _ALPHA_5 = "ABCDEFGHJKLMNPQRSTUVWXYZ"
 _SGP4_XP = "4"
 _VALUES = bytes(c - 48 if 48 <= c <= 57 else c == 45 for c in range(256))  # of a character, for the checksum
+_TYPED = str.maketrans(
+    {"\ufeff": "", "\xa0": " ", "\x1a": " ", "\u2212": "-", "\u2013": "-"}
+)  # by editors, web pages, DOS
 _NO_CHECKSUM = "no checksum at the ends of the lines: damage would not be noticed"
 
 
@@ -111,9 +114,7 @@ def _numbers(*lines: _Line) -> tuple[int, ...]:
 
 
 def _content_lines(text: str) -> list[_Line]:
-    text = (
-        text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n").replace("\xa0", " ").replace("\x1a", " ")
-    )
+    text = text.replace("\r\n", "\n").replace("\r", "\n").translate(_TYPED)
     lines = []
     for number, raw in enumerate(text.split("\n"), start=1):
         line = raw.strip()
@@ -237,9 +238,9 @@ def _number(line: _Line, first: int, last: int, what: str) -> float:
 
 def _digits(line: _Line, first: int, last: int, what: str) -> int:
     """Digits; blanks among them are zeros, as Fortran wrote them."""
-    field = line.text[first - 1 : last].replace(" ", "0")
+    given = line.text[first - 1 : last]
+    field = given.replace(" ", "0") if given.strip() else ""
     if not (field.isascii() and field.isdigit()):
-        given = line.text[first - 1 : last]
         raise _BadLineError(line, f"{what} (columns {first}-{last}) is {given!r}, not {last - first + 1} digits")
     return int(field)
 
