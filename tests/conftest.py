@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+import signal
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,10 @@ DATA = SHARED / "data"
 
 os.umask(0o022)  # whatever the caller's is: it decides who may write the files of the tests
 os.environ.setdefault("MPLCONFIGDIR", str(PROJECT / ".pytest_cache" / "matplotlib"))  # no cache in anybody's home
+
+for number in (signal.SIGINT, signal.SIGHUP, signal.SIGQUIT):  # which nohup and a shell's background have ignored,
+    if signal.getsignal(number) is signal.SIG_IGN:  # and what the tests start would inherit that
+        signal.signal(number, signal.default_int_handler if number == signal.SIGINT else lambda *_: None)
 
 # The same examples in every run, no matter how busy the machine: a test fails for the code's sake or not at all.
 # New examples, kept in .hypothesis where one fails: pytest --hypothesis-profile=explore
