@@ -197,3 +197,18 @@ def test_a_sector_bit_that_changes_in_flight_changes_nothing_but_an_alarm() -> N
     assert not events_named(steady, "sector.wrong")
     assert [row.encoder_az_deg for row in wrong.rows] == [row.encoder_az_deg for row in steady.rows]
     assert "sector bit" in wrong.snapshots[-1].turn_alarm
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_p1_with_a_random_bit_where_the_turn_is_open_no_register_leaves_the_antenna_at_the_start(seed: int) -> None:
+    """Readings on two turns make no rate."""
+    target = demo_target(azimuth={"min_deg": -90.0, "max_deg": 450.0, "max_rate_deg_s": 8.0})
+    begin_tai_s = the_pass(target, T).rise_tai_s - RISE_S
+    antenna = AcuChoice(azimuth_deg=-0.1, elevation_deg=10.0, sector_bit="random", mode="remote")
+    flight = flight_of(target, begin_tai_s, 100.0, antenna=antenna, seed=seed)
+    places = {round(row.tai_s, 1): row.encoder_az_deg for row in flight.rows}
+    written = [(tai_s, one.az_deg) for tai_s, one in flight.commands if isinstance(one, WriteAndPoll | WriteRegisters)]
+    for tai_s, az_deg in written[:30]:
+        assert abs(wrap_180(az_deg - places[round(tai_s, 1)])) < 15.0
+    assert not events_named(flight, "axis.latched")
+    assert flight.states()[-1] == "AUTOTRACK/FITTED"

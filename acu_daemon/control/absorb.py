@@ -113,8 +113,10 @@ def _located(
         events.append(Event("sector.wrong", fields, is_warning=True))
     elif turn.wrong_half is not None and new.wrong_half is None:
         events.append(Event("sector.right"))
-    shift_deg = 360.0 * round((az_deg - state.az_deg) / 360.0) if near_deg is not None else 0.0
-    if shift_deg:
+    shift_deg = 0.0 if last is None else 360.0 * round((az_deg - state.az_deg) / 360.0)
+    if shift_deg and near_deg is None:
+        state = on_other_turn(state, shift_deg)  # a rate over two turns would be a whole turn in a moment
+    elif shift_deg:
         fields = {"az_deg": az_deg, "believed_deg": az_deg - shift_deg, "sector_bit": int(status.is_sector_high)}
         events.append(Event("turn.corrected", fields, is_warning=True))
         state = on_other_turn(state, shift_deg)

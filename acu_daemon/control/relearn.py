@@ -1,6 +1,6 @@
 """A turn of the azimuth that cannot be true is learned anew (control.turn has the theory).  Pure.
 
-    BELIEVED --doubt--> STOPPING --stands--> MOVING --has followed--> BELIEVED, and sure
+    BELIEVED --doubt--> STOPPING --stands--> MOVING --has followed--> BELIEVED, until a place shows that it is so
 
 STOPPING: STOP until it is acknowledged, no register is written and no mode selected until the antenna stands.  MOVING:
 the other turn is taken for the true one, the start begins anew (the present angles first), and the antenna is moved by
@@ -21,17 +21,24 @@ from acu_daemon.protocol.messages import AcuMode, Status
 
 STEP_DEG = 5.0
 ARRIVED_DEG = 1.0
+MOST_LEARNED = 4  # turns in a run
 STANDING_DEG = 0.1  # over the newest readings
 OTHERS_MODES = (AcuMode.MANUAL, AcuMode.STOWING, AcuMode.STOWED, AcuMode.FAULT)
 
 
 def may_be_other_turn(state: ControlState, config: ControlConfig) -> bool:
     """Whether an azimuth that moves away from its command does so because it stands on the other turn."""
-    if state.turn.is_sure or state.turn.phase is not Phase.BELIEVED or state.in_force is None:
+    if not _may_doubt(state) or state.in_force is None:
         return False
     first, last = state.track_of_readings[0], state.track_of_readings[-1]
     rate_deg_s = (last[1] - first[1]) / (last[0] - first[0]) if last[0] > first[0] else 0.0
     return is_pulled_round(state.az_deg, rate_deg_s, state.in_force[1], config.azimuth)
+
+
+def _may_doubt(state: ControlState) -> bool:
+    """Not a turn that is sure, and not again and again: an axis that fails on both turns is latched at last."""
+    turn = state.turn
+    return turn.phase is Phase.BELIEVED and not turn.is_sure and turn.learned_count < MOST_LEARNED
 
 
 def doubt(state: ControlState, config: ControlConfig, events: list[Event], why: str) -> ControlState:
@@ -76,7 +83,7 @@ def watch_turn(state: ControlState, seen: Observation, config: ControlConfig, ev
     state = state if turn is state.turn else changed(state, turn=turn)
     if is_pulled_for_good:
         return doubt(state, config, events, "the azimuth moves away from its command, as it would on the other turn")
-    if is_standing and not turn.is_sure and other_turn(state.az_deg, config.azimuth) is not None:
+    if is_standing and _may_doubt(state) and other_turn(state.az_deg, config.azimuth) is not None:
         return doubt(state, config, events, "the azimuth comes no nearer to its goal")
     return state
 
@@ -129,8 +136,7 @@ def _moved(state: ControlState, status: Status, events: list[Event]) -> ControlS
     by = "the antenna follows on it" if has_followed else "autotrack holds the satellite"
     events.append(Event("turn.learned", {"az_deg": state.az_deg, "by": by}))
     state = _settled(state)
-    turn = changed(state.turn, is_sure=has_followed, learned_count=state.turn.learned_count + 1)
-    return changed(state, turn=turn)
+    return changed(state, turn=changed(state.turn, learned_count=state.turn.learned_count + 1))
 
 
 def _settled(state: ControlState) -> ControlState:
