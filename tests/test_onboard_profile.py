@@ -16,11 +16,12 @@ from acu_daemon.edge.onboard import load_pass
 from acu_daemon.errors import ProfileError, UsageError
 from acu_daemon.model import AxisLimits
 from acu_daemon.onboard.bound import least_rate
+from acu_daemon.onboard.branches import AZIMUTH_GUARD
 from acu_daemon.onboard.checks import Backlash, check_profile
 from acu_daemon.onboard.cone import Cone, Tube, azimuth_tube, windings
 from acu_daemon.onboard.corrections import after_backlash, aimed, best_turn_deg, with_backlash
 from acu_daemon.onboard.frames import angles_between_deg, beam_direction, lvlh_from_inertial
-from acu_daemon.onboard.free import AZIMUTH_GUARD, free_profile
+from acu_daemon.onboard.free import free_profile
 from acu_daemon.onboard.parameter_file import read, write
 from acu_daemon.onboard.pipeline import make
 from acu_daemon.onboard.profile import off_pointing, peak_rate_deg_s

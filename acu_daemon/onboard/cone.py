@@ -17,7 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from acu_daemon.onboard.frames import boresight_vector
+from acu_daemon.onboard.quintic import Indices
 from acu_daemon.units import DEG, Array
+
+_EDGE_STEPS = 121
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,13 +47,45 @@ class Tube:
     upper_deg: Array
 
 
-def azimuth_tube(cone: Cone, time_s: Array, az0_deg: Array, el0_deg: Array) -> Tube:
-    """Make the tube around continuous station angles (N,), on the winding that these take."""
+def azimuth_tube(cone: Cone, time_s: Array, az0_deg: Array, el0_deg: Array, *, is_outer: bool = False) -> Tube:
+    """Make the tube around continuous station angles (N,), on the winding that these take.
+
+    Where elevation's range cuts it the edge is searched in steps: inside the true one, or with is_outer outside.
+    """
     sin_el = np.maximum(np.sin(el0_deg * DEG), 1e-12)
     cross, m = cone.boresight_cross_deg, cone.margin_deg
     low, high = (np.arcsin(np.clip(np.sin((cross + s * m) * DEG) / sin_el, -1.0, 1.0)) / DEG for s in (-1.0, 1.0))
     is_free = axis_is_inside(cone, el0_deg)
-    return Tube(time_s, np.where(is_free, -np.inf, az0_deg - high), np.where(is_free, np.inf, az0_deg - low))
+    tube = Tube(time_s, np.where(is_free, -np.inf, az0_deg - high), np.where(is_free, np.inf, az0_deg - low))
+    reach_deg = m + abs(cross) + abs(cone.boresight_elevation_deg)
+    is_near = (el0_deg - reach_deg < cone.el_min_deg) | (el0_deg + reach_deg > cone.el_max_deg)
+    cut = np.flatnonzero(is_near & ~is_free)
+    return _in_elevation_range(cone, tube, az0_deg, el0_deg, cut, outwards=int(is_outer)) if cut.size else tube
+
+
+def _in_elevation_range(cone: Cone, tube: Tube, az0_deg: Array, el0_deg: Array, cut: Indices, outwards: int) -> Tube:
+    """Keep, at the samples `cut`, the azimuths that have an elevation in range: the run of them around the widest."""
+    lower, upper = tube.lower_deg.copy(), tube.upper_deg.copy()
+    shares = np.linspace(0.0, 1.0, _EDGE_STEPS)
+    for k in cut:
+        tried = lower[k] + shares * (upper[k] - lower[k])
+        p = np.broadcast_to(_direction(az0_deg[k], el0_deg[k]), (tried.size, 3))
+        low, high = elevation_interval(cone, p, tried)
+        room = high - low
+        if room.max() < 0.0:
+            upper[k] = lower[k] - 1.0
+            continue
+        best = int(np.argmax(room))
+        bad = np.flatnonzero(room < 0.0)
+        first = int(bad[bad < best].max(initial=-1)) + 1 - outwards
+        last = int(bad[bad > best].min(initial=tried.size)) - 1 + outwards
+        lower[k], upper[k] = tried[max(first, 0)], tried[min(last, tried.size - 1)]
+    return Tube(tube.time_s, lower, upper)
+
+
+def _direction(az_deg: float, el_deg: float) -> Array:
+    az, el = az_deg * DEG, el_deg * DEG
+    return np.array([np.cos(az) * np.sin(el), np.sin(az) * np.sin(el), np.cos(el)])
 
 
 def axis_is_inside(cone: Cone, el0_deg: Array) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":

@@ -10,10 +10,11 @@ import numpy as np
 
 from acu_daemon.errors import ProfileError
 from acu_daemon.model import AxisLimits, Station
+from acu_daemon.onboard.branches import find_branches, least_bound
 from acu_daemon.onboard.checks import NO_BACKLASH, Backlash, Check, check_profile
 from acu_daemon.onboard.corrections import with_backlash
 from acu_daemon.onboard.frames import Gimbal
-from acu_daemon.onboard.free import find_branches, free_profile
+from acu_daemon.onboard.free import free_profile
 from acu_daemon.onboard.methods import make_profile
 from acu_daemon.onboard.pointed import FOLLOWS_DEG, fit
 from acu_daemon.onboard.profile import Method, Objective, Profile, Task
@@ -44,6 +45,10 @@ def make(
     Raises:  ProfileError: no path keeps to margin, ranges and limits; says what would.
     """
     refuse_out_of_reach(task)
+    if objective == "imaging" and not task.imaging.any():
+        raise ProfileError(
+            "the camera never works in this pass: name a strip, a target or a span of imaging, or use peak"
+        )
     play_deg = backlash.azimuth_deg + backlash.elevation_deg
     spare_deg = play_deg / 2.0 + FOLLOWS_DEG * (play_deg > 0.0)
     if spare_deg >= task.margin_deg:
@@ -53,7 +58,7 @@ def make(
     if profile is None:
         raise ProfileError(why_not(planned, spare_deg))
     if profile.bound is not None:
-        profile = replace(profile, bound=find_branches(task)[0].bound)  # of the whole margin, the backlash's share too
+        profile = replace(profile, bound=least_bound(task))  # of the whole margin, the backlash's share too
     first = check_profile(task, profile)
     if play_deg > 0.0:
         profile = _led(task, profile, backlash)

@@ -41,7 +41,7 @@ def _slowed(path: Path, time_s: Array, wanted_deg: Array, limits: AxisLimits) ->
     rate, acceleration = (float(np.abs(path.value(time_s, k)).max()) for k in (1, 2))
     if rate <= limits.max_rate_deg_s and acceleration <= limits.max_acceleration_deg_s2:
         return path
-    used = _samples(time_s, path.knots)
+    used = samples_for(time_s, path.knots)
     slow = nearest_path(time_s[used], wanted_deg[used], path.knots, *caps(limits))
     return path if slow is None else slow
 
@@ -55,7 +55,7 @@ def fit(
     knots = Knots(starts)
     across = np.sin(wanted.el_deg * DEG)
     while True:
-        used = _samples(time_s, knots)
+        used = samples_for(time_s, knots)
         paths = [_nearest(time_s[used], angle[used], knots) for angle in (wanted.az_deg, wanted.el_deg)]
         az_error, el_error = (
             path.value(time_s) - angle for path, angle in zip(paths, (wanted.az_deg, wanted.el_deg), strict=True)
@@ -76,8 +76,8 @@ def _nearest(time_s: Array, angle_deg: Array, knots: Knots) -> Path:
     return path
 
 
-def _samples(time_s: Array, knots: Knots) -> Indices:
-    """All samples of short pieces, every fifth of long ones."""
+def samples_for(time_s: Array, knots: Knots) -> Indices:
+    """Indices of samples: all of short pieces, every fifth of long ones."""
     index = np.arange(time_s.size)
     is_short = knots.length_s[knots.piece_of(time_s)] < _SPARSE_PIECE_S
     used: Indices = index[is_short | (index % PER_PLAN_STEP == 0)]

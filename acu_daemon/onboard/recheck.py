@@ -49,7 +49,9 @@ def check_certificate(found: ParameterFile, task: Task | None) -> list[Check]:
     view = task.view.plan
     station = task.station_gimbal(view)
     off_deg = inf
-    for tube in windings(azimuth_tube(task.cone, view.time_s, station.az_deg, station.el_deg), station.az_deg):
+    for tube in windings(
+        azimuth_tube(task.cone, view.time_s, station.az_deg, station.el_deg, is_outer=True), station.az_deg
+    ):
         for turn_deg in (0.0, 360.0, -360.0, 720.0, -720.0):
             low = float(np.interp(bound.low_time_s, view.time_s, tube.lower_deg)) + turn_deg
             high = float(np.interp(bound.high_time_s, view.time_s, tube.upper_deg)) + turn_deg

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from acu_daemon.onboard.branches import AZIMUTH_GUARD, least_bound
 from acu_daemon.onboard.cone import Tube, azimuth_tube, windings
-from acu_daemon.onboard.free import AZIMUTH_GUARD, find_branches
 from acu_daemon.onboard.profile import RATE_GUARD, Task
 from acu_daemon.units import Array
 
@@ -28,8 +28,8 @@ class Interruption:
 
 def bound_at(task: Task, margin_deg: float) -> float:
     """The least largest azimuth rate with another margin; infinite where azimuth's range leaves no path."""
-    branches = find_branches(replace(task, cone=replace(task.cone, margin_deg=margin_deg)))
-    return branches[0].bound.rate_deg_s if branches else np.inf
+    bound = least_bound(replace(task, cone=replace(task.cone, margin_deg=margin_deg)))
+    return np.inf if bound is None else bound.rate_deg_s
 
 
 def least_margin_deg(task: Task, rate_deg_s: float) -> float | None:
