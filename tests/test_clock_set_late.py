@@ -13,6 +13,7 @@ from acu_daemon.cli.clock_wait import wait_for_clock
 from acu_daemon.cli.options import coming_pass, load_target
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.clock_sense import before_elements, before_release
+from acu_daemon.errors import UsageError
 from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.protocol.messages import Stop
 
@@ -65,6 +66,17 @@ def test_a_stop_that_comes_while_a_run_begins_anew_ends_it(tmp_path: Path) -> No
         assert told.outcome is not None
         assert (told.outcome.reason, told.outcome.is_stopped) == ("SIGTERM", True)
         assert told.snapshots[-1].tai_s < RISE_TAI_S - 380.0
+
+
+def test_where_nothing_can_be_tracked_by_the_clock_that_was_set_the_antenna_is_stopped_and_the_reason_told(
+    tmp_path: Path,
+) -> None:
+    actions = [(8.0, lambda story: story.step(60.0))]
+    story = Story(DEMO, RISE_TAI_S - 400.0, 20.0, slow_s=60.0, actions=actions, is_refused_anew=True)
+    with pytest.raises(UsageError, match="no pass"):
+        tell(story, tmp_path / "state")
+    assert story.commands.count(Stop()) == 1
+    assert len(story.named("stop.done")) == 1
 
 
 class Booted(SystemClock):

@@ -23,6 +23,7 @@ from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.edge.clock import LoopClock, SystemClock
 from acu_daemon.edge.fit import InlineFitRunner
+from acu_daemon.errors import UsageError
 from acu_daemon.protocol.messages import Command
 from acu_daemon.protocol.sa3842 import CommandEvent
 from acu_daemon.sim.acu import FakeAcu
@@ -88,6 +89,7 @@ class Story:
     duration_s: float
     slow_s: float = 0.0  # the system's clock, at the start
     actions: list[tuple[float, Callable[["Story"], None]]] = field(default_factory=list)
+    is_refused_anew: bool = False  # the second run finds something that it cannot begin with
     system_offset_s: float = 0.0
     snapshots: list[Snapshot] = field(default_factory=list)
     events: list[dict[str, Any]] = field(default_factory=list)
@@ -126,6 +128,8 @@ class Story:
 
         def begin(memory: ControlState | None) -> Service:
             if memory is not None:
+                if self.is_refused_anew:
+                    raise UsageError("no pass")
                 clock.obey()
                 self.jobs.append(prepare(frame, elements.target, memory))
             job = self.jobs[-1].job

@@ -1,6 +1,7 @@
 """One run after another of the same daemon: begun anew where the clock was set or better elements came, before a pass.
 
-Between two runs the link is closed and opened, and nothing is told the ACU: the antenna stays as it is.
+Between two runs the link is closed and opened, and nothing is told the ACU: the antenna stays as it is.  Where the next
+one cannot begin, it is stopped.
 """
 
 from collections.abc import Callable
@@ -10,6 +11,7 @@ import structlog
 
 from acu_daemon.control.state import ControlState
 from acu_daemon.daemon.service import Outcome, Service
+from acu_daemon.errors import AcuDaemonError
 
 
 class Runs:
@@ -37,7 +39,11 @@ class Runs:
             if not self._service.anew_reason or self._is_stopping():
                 return outcome
             log.warning("run.anew", reason=self._service.anew_reason)
-            self._service = self._begin(self._service.memory)
+            try:
+                self._service = self._begin(self._service.memory)
+            except AcuDaemonError:  # such as elements that are too old by the clock that was set
+                await self._service.stop_after_all()
+                raise
 
     def _is_stopping(self) -> bool:
         return bool(self._stop_reason)

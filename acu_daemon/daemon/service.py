@@ -161,6 +161,15 @@ class Service:
         self._leave(is_stopped=is_stopped)
         return is_stopped
 
+    async def stop_after_all(self) -> None:
+        """Stop the antenna where this run was to be followed by another, and is not."""
+        keeper = asyncio.create_task(self._port.keep(), name="link")
+        try:
+            self._leave(is_stopped=await self._safe_stop())
+        finally:
+            keeper.cancel()
+            await asyncio.gather(keeper, return_exceptions=True)
+
     async def _track(self) -> str:
         self._started_tai_s = self._clock.tai_s()
         async with asyncio.TaskGroup() as inner:
