@@ -58,6 +58,8 @@ class SerialLink:
             fcntl.ioctl(port.fileno(), termios.TIOCEXCL)
             port.reset_input_buffer()
         except BaseException:
+            with contextlib.suppress(OSError):  # whoever keeps the port open, as a simulator does, keeps this too
+                fcntl.ioctl(port.fileno(), termios.TIOCNXCL)
             port.close()
             raise
         return port
