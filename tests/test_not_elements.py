@@ -12,7 +12,7 @@ from config_files import STATION, from_file, write
 from conftest import DATA, SHARED, needs_data
 from hypothesis import given
 from hypothesis import strategies as st
-from made_oems import kvn, states
+from made_oems import kvn, states, xml
 
 from acu_daemon.cli.options import coming_pass, load_target, nearest_to_pass
 from acu_daemon.orbit.contents import binary_kind, decoded, kind_of, what_else
@@ -97,7 +97,10 @@ def test_what_stands_in_place_of_elements_is_named_and_quoted(
     done = passes(config(tmp_path, content, kind=kind))
     assert (done.code, done.out) == (2, "")
     [line] = done.err.splitlines()
-    assert line == f"acu-daemon: {tmp_path}/satellites/s.txt: {said}" or line.split("s.txt: ")[1].startswith(said)
+    assert line.startswith(f"acu-daemon: sat is left out: {tmp_path}/satellites/s.txt: {said}")
+    asked = passes(tmp_path, "--satellite", "sat")
+    assert asked.code == 2
+    assert asked.err.startswith(f"acu-daemon: {tmp_path}/satellites/s.txt: {said}")
 
 
 @given(st.binary() | st.text().map(str.encode) | st.text().map(lambda text: ("<html>" + text).encode()))
@@ -117,7 +120,8 @@ def test_the_defect_of_the_wanted_set_comes_first_and_header_text_is_no_defect(t
     wanted = from_file("AO-07", "tle", "s.txt", 7530)
     first, second = passes(config(tmp_path, BULLETIN, wanted)).err.splitlines()
     assert first == (
-        f"acu-daemon: {tmp_path}/satellites/s.txt, line 17: checksum 2, computed 3: the line was changed; fetch it anew"
+        f"acu-daemon: sat is left out: {tmp_path}/satellites/s.txt, line 17: checksum 2, computed 3: the line was "
+        "changed; fetch it anew"
     )
     assert "no element set with norad_id 7530; the file holds IO-26 (22825)" in second
     by_name = passes(config(tmp_path, BULLETIN, from_file("AO-07", "tle", "s.txt")))
@@ -161,7 +165,7 @@ def test_the_kind_is_that_of_the_file_whatever_the_toml_says(tmp_path: Path) -> 
     assert done.code == 0
     assert 'elements.kind = "omm", but' in done.err
     assert 'is of kind "tle" and read as that' in done.err
-    assert kind_of(kvn(states(300.0))) == "oem"
+    assert kind_of(kvn(states(300.0))) == kind_of(xml(states(300.0))) == "oem"
     assert kind_of(json.dumps([{"OBJECT_NAME": "X", "MEAN_MOTION": 15.0, "TLE_LINE1": "1 25544U 98067A"}])) == "omm"
 
 

@@ -80,8 +80,10 @@ def command(
             typer.echo(f"warning: {name} is left out: {'; '.join(reason.splitlines())}", err=True)
     _show(seen, omitted, start_tai_s, end_tai_s, as_json=as_json)
     if not seen:
-        alone = next(iter(omitted.values()))
-        raise UsageError(alone if len(names) == 1 else f"no satellite of {config}/satellites can be used")
+        [(name, reason), *others] = omitted.items()
+        if others:
+            raise UsageError(f"no satellite of {config}/satellites can be used")
+        raise UsageError(reason if satellite is not None else f"{name} is left out: {reason}")
 
 
 def _search(config: Path, name: str, start_tai_s: float, end_tai_s: float) -> _Seen:

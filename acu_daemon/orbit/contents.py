@@ -18,7 +18,7 @@ _UTF_16 = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
 _TLE = re.compile(r"^[ \t\xa0]*[12][ \t\xa0][ 0-9A-Za-z][ 0-9]{3}[0-9]", re.MULTILINE)
 _OMM = re.compile(r"CCSDS_OMM_VERS|MEAN_MOTION|<omm\b|NORAD_CAT_ID", re.IGNORECASE)
 _OEM = re.compile(r"CCSDS_OEM_VERS|META_START|<oem\b|<stateVector", re.IGNORECASE)
-_PAGE = re.compile(r"<!doctype\s+html|<html\b|<head\b|<body\b", re.IGNORECASE)
+_PAGE = re.compile(r"<!doctype\s+html|<html\b|<head>|<title\b", re.IGNORECASE)  # <body> is also of CCSDS messages
 _UNSEEN = re.compile(r"<(script|style)\b.*?</\1\s*>|<!--.*?-->", re.IGNORECASE | re.DOTALL)
 
 
