@@ -181,7 +181,9 @@ def test_sets_are_read_as_people_have_them(one: str, two: str) -> None:
     assert found.norad_id in (25544, 270001)
 
 
-@pytest.mark.parametrize(("one_length", "two_length"), [(68, 68), (64, 63), (61, 68), (67, 63)])
+@pytest.mark.parametrize(
+    ("one_length", "two_length"), [(68, 68), (64, 63), (61, 68), (67, 63), (69, 63), (69, 67), (62, 69)]
+)
 def test_sets_without_checksums_are_read_with_a_note(one_length: int, two_length: int) -> None:
     [found], [note] = parse(NAME, ONE[:one_length], TWO[:two_length])
     [same], [] = parse(NAME, ONE, TWO)

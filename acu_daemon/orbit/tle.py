@@ -188,10 +188,11 @@ def _element_set(one: _Line, two: _Line, name: str, file: str) -> ElementSet:
 
 
 def _check_form(one: _Line, two: _Line) -> None:
-    """Both lines with their checksums, or both without: one alone has lost a character somewhere."""
-    are_cut = len(one.text) < _LENGTH and len(two.text) < _LENGTH
+    """With a checksum or, cut at the end, without; one line of 68 characters may have lost any one of them."""
+    are_both_cut = len(one.text) < _LENGTH and len(two.text) < _LENGTH
     for line in (one, two):
-        if len(line.text) < (_LEAST[line.kind] if are_cut else _LENGTH):
+        is_cut = len(line.text) < (_LENGTH if are_both_cut else _LENGTH - 1)
+        if len(line.text) < (_LEAST[line.kind] if is_cut else _LENGTH):
             raise _BadLineError(line, f"{len(line.text)} characters, an element line has {_LENGTH}")
         if problem := _form_problem(line.text):
             raise _BadLineError(line, problem)
