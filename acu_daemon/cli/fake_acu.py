@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from acu_daemon.cli.options import At, AtMonotonic, Config, Satellite, load_target, make_clock
+from acu_daemon.cli.options import At, AtMonotonic, Config, Satellite, load_target, make_clock, nearest_to_pass
 from acu_daemon.cli.serving import Control, Place, parse_place, serve_until_stopped
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.link import BITS_PER_CHARACTER, DEFAULT_BAUD, make_link
@@ -73,6 +73,7 @@ def command(
     """
     clock = make_clock(at, at_monotonic)
     target = load_target(config, satellite, clock.tai_s(), is_strict=False)
+    target = nearest_to_pass(config, satellite, target, clock.tai_s(), is_strict=False)  # as the daemon chooses
     station = target.station
     acu = build_fake_acu(
         azimuth=station.acu.azimuth.limits(),
