@@ -32,7 +32,7 @@ pytestmark = pytest.mark.realtime
 
 PATIENCE_S = 60.0  # a hang fails the test; a slow machine does not
 MAX_ERROR_DEG = 0.1
-HELD_S = 5.0
+HELD_S = 10.0  # of which the last two seconds are judged: the way there is longer on a busy machine
 ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 ON_A_TERMINAL = (sys.executable, "-c", "import os, sys; os.login_tty(0); os.execv(sys.argv[1], sys.argv[1:])")
 
