@@ -13,7 +13,7 @@ that far, and the error of the size, which moves it by w tau.
 """
 
 from dataclasses import dataclass
-from math import exp, hypot
+from math import exp, hypot, sqrt
 
 import numpy as np
 
@@ -28,6 +28,7 @@ FIRST_SIGMA = (50.0, 100.0 / DAY_S, SHARE_SIGMA)
 RATE_WALK_M_S15 = 0.5 / DAY_S**1.5
 EXECUTION_SIGMA = 0.02
 MARGIN_SIGMAS = 3.0
+DECIDING_SIGMAS = 1.5  # of D, before the upper limit; in a band of kilometres they are nothing
 LEAST_MARGIN, LARGEST_MARGIN = 0.1, 0.5  # of the range
 _PASSES = 3  # of the size and its margin
 FORECAST_STEP_S = 3.0 * 3600.0
@@ -151,7 +152,8 @@ class OurController:
         settings = self._settings
         d_m, rate_m_s, _ = self.filter.state
         next_m = d_m + rate_m_s * OBSERVATIONS * self.filter.forecast.step_s
-        if max(d_m, next_m) < settings.d_max_m or rate_m_s <= 0.0:
+        sigma_m = DECIDING_SIGMAS * sqrt(self.filter.covariance[0, 0])
+        if max(d_m, next_m) < settings.d_max_m - sigma_m or rate_m_s <= 0.0:
             return 0.0
         size_m = self._push_m_s(step) / self._reference.by_a.drift
         if size_m <= 0.0:
