@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from acu_daemon.errors import UsageError
 from acu_daemon.groundtrack.environment import STEP_S, even_steps, free_motion
-from acu_daemon.groundtrack.gps import FIX_S, NO_STEERING, Receiver, Ripple, TrueOrbit
-from acu_daemon.groundtrack.loop import fly
+from acu_daemon.groundtrack.gps import FIX_S, FIXES, NO_STEERING, Receiver, Ripple, TrueOrbit
+from acu_daemon.groundtrack.loop import BLOCK_STEPS, fly
 from acu_daemon.groundtrack.navigator import Navigator, NavigatorSetup, drift_of
 from acu_daemon.groundtrack.our_controller import DriftFilter, Forecast
 from acu_daemon.groundtrack.paper_controller import PaperController, PaperSettings
@@ -22,7 +22,7 @@ from acu_daemon.groundtrack.storms import with_storms
 from acu_daemon.units import DAY_S
 
 RAW_RMS_M = 202.0  # of the fixes in three dimensions, seed 003 as read in docs/groundtrack.md
-NAVIGATOR_D_M, NAVIGATOR_M = 12.0, 70.0
+NAVIGATOR_D_M = 10.0
 NO_RIPPLE = Ripple(90.0, np.zeros((4, 3)))
 PERFECT = Case("moderate", 3900.0, navigator="perfect", days=60.0)
 
@@ -68,7 +68,11 @@ def _errors(navigator: Navigator | PaperNavigator, days: float) -> tuple[float, 
     orbit, receiver = TrueOrbit(free, NODE_RAD), Receiver(days, np.random.default_rng(5))
     times_s = even_steps(FIX_S, FIX_S, int(days * DAY_S / FIX_S))
     r_m, _ = orbit.states(times_s, NO_STEERING)
-    seen = drift_of(CRAFT.reference, navigator.observe(0.0, r_m + receiver.errors_m(times_s)))
+    fixes_m = r_m + receiver.errors_m(times_s)
+    block = BLOCK_STEPS * FIXES
+    starts = range(0, len(fixes_m), block)
+    estimates = [navigator.observe(float(times_s[k]) - FIX_S, fixes_m[k : k + block]) for k in starts]
+    seen = drift_of(CRAFT.reference, np.vstack(estimates))
     left = (seen - orbit.drift_m(times_s[19::20], NO_STEERING))[seen.size // 2 :]
     return float(np.sqrt(np.mean(left**2))), float(np.max(np.abs(left)))
 

@@ -8,9 +8,9 @@ the receiver's systematic error in radial, along and across.  What is seen is th
     along   = a (dalpha + cos i draan) + 2 a (dex sin u - dey cos u)
     across  = a (di sin u - draan cos u sin i)
 
-The nominal contains the short-period terms of J2 and, where there is a table, the tesserals.  It is moved to the
-estimate at every block of fixes, so the deviations stay linear.  A manoeuvre enters a with its commanded size and adds
-its uncertainty: nothing is forgotten.
+The nominal contains the short-period terms of J2, Sun and Moon and, where there is a table, the tesserals.  It is moved
+to the estimate at every block of fixes, so the deviations stay linear.  A manoeuvre enters a with its commanded size
+and adds its uncertainty: nothing is forgotten.
 """
 
 from dataclasses import dataclass
@@ -18,8 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from acu_daemon.groundtrack.elements import MeanElements, states_of
-from acu_daemon.groundtrack.environment import even_steps
+from acu_daemon.groundtrack.environment import EPOCH_TAI_S, even_steps
 from acu_daemon.groundtrack.gps import FIX_S, FIXES, NOISE_M, STEP_SIGMA_M, Ripple, axes_of, displaced
+from acu_daemon.groundtrack.lunisolar import plane_rates
 from acu_daemon.groundtrack.reference import ReferenceOrbit
 from acu_daemon.units import DAY_S, Array
 
@@ -35,7 +36,7 @@ BIAS_TIME_S = 320.0  # the steps last 480 s on average: the half of the correlat
 RATE_WALK_M_S15 = 3.0 / DAY_S**1.5  # of da/dt: 3 m/day in a day
 UNMODELLED_M, UNMODELLED_WITHOUT_M = 25.0, 250.0  # left by the field's model on each axis, with a table and without
 WALK_A_M_S05 = 2.0 / DAY_S**0.5  # of the semi-major axis
-WALK_M_S05 = 20.0 / DAY_S**0.5  # of the elements, each times a: Sun, Moon and what else the nominal leaves out
+WALK_M_S05 = 5.0 / DAY_S**0.5  # of the elements, each times a: what the nominal leaves out
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +46,7 @@ class NavigatorSetup:
     reference: ReferenceOrbit
     node_rad: float
     ripple: Ripple | None = None
+    start_tai_s: float = EPOCH_TAI_S
 
 
 class Navigator:
@@ -67,7 +69,7 @@ class Navigator:
         self._p[A, A] += sigma_m**2
 
     def observe(self, start_s: float, fixes_m: Array) -> Array:
-        """Take fixes, (20 N, 3) TEME in metres, the first 9 s after `start_s`.
+        """Take a block of fixes, some hours of them, (20 N, 3) TEME in metres, the first 9 s after `start_s`.
 
         Returns: estimates at start_s + 180 s, + 360 s, ...: (N, 6) offsets of a (m), ex, ey, i, raan and alpha (rad)
                  from the reference orbit.
@@ -96,25 +98,32 @@ class Navigator:
         self._x, self._p = self._block[taken - 1].copy(), self._covariances[taken - 1].copy()
 
     def _nominal(self, start_s: float, times_s: Array) -> MeanElements:
-        """The present estimate, propagated."""
+        """The present estimate, propagated; what Sun and Moon do is steady over a block."""
         reference, x = self._setup.reference, self._x * self._scale
         t = times_s - start_s
         zero = np.zeros_like(t)
+        sky = self._sky(start_s)
         a = x[A] + x[RATE] * t
         summed = x[A] * t + 0.5 * x[RATE] * t * t
         by_a, by_i = reference.by_a, reference.by_i
+        tilted = x[TILT] * t + 0.5 * sky[0] * t * t
+        raan = reference.raan_rate_rad_s * times_s + x[RAAN] + by_a.raan * summed + by_i.raan * tilted
+        alpha = reference.alpha_rate_rad_s * times_s + x[ALPHA] + by_a.alpha * summed + by_i.alpha * tilted
         return MeanElements(
             reference.a_m + a,
             zero + x[EX],
             zero + reference.e + x[EY],
-            zero + reference.i_rad + x[TILT],
-            self._setup.node_rad
-            + reference.raan_rate_rad_s * times_s
-            + x[RAAN]
-            + by_a.raan * summed
-            + by_i.raan * x[TILT] * t,
-            reference.alpha_rate_rad_s * times_s + x[ALPHA] + by_a.alpha * summed + by_i.alpha * x[TILT] * t,
+            reference.i_rad + x[TILT] + sky[0] * t,
+            self._setup.node_rad + raan + sky[1] * t,
+            alpha + sky[2] * t,
         )
+
+    def _sky(self, time_s: float) -> tuple[float, float, float]:
+        """What Sun and Moon add to inclination, node and alpha, rad/s."""
+        setup, reference = self._setup, self._setup.reference
+        node = setup.node_rad + reference.raan_rate_rad_s * time_s
+        rates = plane_rates(np.array([setup.start_tai_s + time_s]), reference.a_m, reference.i_rad, np.array([node]))
+        return float(rates.inclination[0]), float(rates.raan[0]), float(rates.alpha[0])
 
     def _offsets(self, nominal: MeanElements, times_s: Array, at: slice) -> Array:
         reference, t = self._setup.reference, times_s[at]
