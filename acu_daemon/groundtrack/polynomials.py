@@ -5,6 +5,7 @@ in the flux.  The acceleration spans two decades, so a polynomial of its logarit
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -51,6 +52,7 @@ def constant_runs(craft: Spacecraft, fluxes: Array, kp: float) -> Array:
     return craft.reference.by_a.drift * np.array(decays)
 
 
+@lru_cache(maxsize=16)
 def fit_polynomials(
     craft: Spacecraft,
     degree: int = 4,
