@@ -17,6 +17,7 @@ pytestmark = pytest.mark.realtime
 
 WINDOW_S = 60.0
 MAX_ERROR_DEG = 0.1
+LEAST_WRITES_PER_S = 6.0  # of ten ticks: a reply that a busy machine brings too late costs the next one its write
 
 
 def late_while_tracking_deg(rig: Any) -> float:
@@ -53,6 +54,6 @@ def test_a_pass_with_a_loss_is_tracked_over_both_links(
     assert result.writes.autotrack_max_deg <= MAX_ERROR_DEG + late
     assert result.writes.rate_share <= 1.0
     ticked_share = result.tick_count / (result.tick_count + result.skipped_tick_count)
-    assert 9.0 * ticked_share <= result.writes.writes_per_s <= 10.2
+    assert LEAST_WRITES_PER_S * ticked_share <= result.writes.writes_per_s <= 10.2
     assert (result.refusal_count, result.refit_failed_count) == (0, 0)
     assert result.refit_count > 10

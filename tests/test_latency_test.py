@@ -18,7 +18,7 @@ from acu_daemon.config import load_station
 from acu_daemon.daemon.lateness import Lateness
 from acu_daemon.daemon.trial import Trial
 from acu_daemon.edge.link import make_link
-from acu_daemon.protocol.messages import Poll
+from acu_daemon.protocol.messages import Identify, Poll
 
 realtime = pytest.mark.realtime
 PATIENCE_S = 60.0
@@ -96,7 +96,8 @@ def test_the_acu_is_polled_and_told_nothing_else(tmp_path: Path) -> None:
         figures = tmp_path / "figures.json"
         tested = acu_daemon("latency-test", "--duration", "2", "--config", tmp_path, "--json", figures)
     assert tested.code in (0, 1), tested.err
-    assert set(asked) == {Poll()}
+    assert Poll() in asked
+    assert set(asked) <= {Poll(), Identify()}  # that one after a reply that came too late
     assert len(asked) >= json.loads(figures.read_text())["tick_count"] > 0
     assert "polls lost" in tested.out
     assert "WRITE AND STATUS" in tested.out
