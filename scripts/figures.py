@@ -60,7 +60,7 @@ from acu_daemon.sim.sky import DirectionTable, OrbitSky, read_truth
 LEAD_S = 60.0
 NOISE_DEG = 0.03
 AZIMUTH, ELEVATION = AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0)
-EFFECT_S = 0.020  # start of a write on TCP to the moment it takes effect, ICD section 6
+EFFECT_S = 0.020  # start of a write on TCP to the moment it takes effect: docs/protocol.md, Time tags
 CASES = {"60 % to the end": (0.60, 1.10, 0.0), "40 to 75 %": (0.40, 0.75, 0.0), "40 to 75 %, bias": (0.40, 0.75, 1.0)}
 
 

@@ -30,7 +30,7 @@ with atheris.instrument_imports(include=["acu_daemon"]):
 
 ROOT = Path(__file__).resolve().parents[1]
 SCRATCH = Path(tempfile.mkdtemp(prefix="acu-fuzz-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
-LONGEST_FRAME = 133  # bytes, ICD section 2
+LONGEST_FRAME = 133  # bytes: docs/protocol.md, Frame
 NOW_TAI_S = 8.4e8
 STATUS = Status(90.0, 45.0, AcuMode.REMOTE)  # angles that 16 bits hold exactly
 

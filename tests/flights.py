@@ -28,7 +28,7 @@ RISING_ANTENNA = AcuChoice(azimuth_deg=168.0, elevation_deg=20.0)
 SCD_HIGH_TAI_S = tai_from_utc("1989-02-01T01:58:45Z") + 350.0  # SCD-1 climbs over Cuiaba
 WRONG_ORBIT = SkyErrors(along_track_s=0.9, delta_raan_deg=0.015)
 NOISE_DEG = 0.02
-EFFECT_S = 0.020  # start of a write to the moment it takes effect, ICD section 6, on TCP
+EFFECT_S = 0.020  # start of a write to the moment it takes effect, on TCP: docs/protocol.md, Time tags
 LSB_DEG = 360.0 / 65536
 ORDERS = (WriteAndPoll, WriteRegisters, SelectMode, SelectBackup, WriteParameter)
 

@@ -442,7 +442,7 @@ def test_a_rehearsal_refuses_what_twice_says_it_is_another_acu() -> None:
 @pytest.mark.parametrize("at_s", [15.03, 15.005], ids=["between two exchanges", "within one"])
 @pytest.mark.parametrize("losses", [[], [(12.0, 30.0)]], ids=["tracking", "lost"])
 def test_a_stop_in_mid_pass_leaves_the_acu_in_standby(losses: list[tuple[float, float]], at_s: float) -> None:
-    """The exchange that is going on ends first: one command is outstanding at most (ICD section 1)."""
+    """The exchange that is going on ends first: one command is outstanding at most (docs/protocol.md, Link)."""
     flight = climb(30.0, losses=losses, script=[(at_s, lambda stage: stage.service.stop("SIGTERM"))])
     assert flight.outcome is not None
     assert flight.outcome.reason == "SIGTERM"

@@ -1,4 +1,4 @@
-"""Every bit of the status block and of FAULT DETAIL alone, in both directions, against the ICD's tables (3 and 4)."""
+"""Every bit of the status block and of FAULT DETAIL alone, in both directions, against docs/protocol.md."""
 
 from dataclasses import fields, replace
 

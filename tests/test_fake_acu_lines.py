@@ -82,7 +82,7 @@ def test_virtual_time_jumps_and_stands_still_when_nothing_can_happen() -> None:
 
 
 def test_the_answer_to_a_command_takes_the_time_of_the_wire_and_the_latency() -> None:
-    """ICD section 6: 17 bytes out and 28 back at 9600 baud are 46.9 ms, with 10 ms of latency 56.9."""
+    """docs/protocol.md, Timing: 17 bytes out and 28 back at 9600 baud are 46.9 ms, with 10 ms of latency 56.9."""
 
     async def exchange() -> tuple[float, float, float]:
         clock = LoopClock(START_TAI_S)

@@ -1,4 +1,4 @@
-"""The fake ACU against ICD sections 4 and 5: modes, backups, timers, registers, bits."""
+"""The fake ACU against docs/protocol.md, Messages and Behaviour: modes, backups, timers, registers, bits."""
 
 import pytest
 from fake_sky import Bench, Star

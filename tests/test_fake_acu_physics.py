@@ -30,7 +30,7 @@ from acu_daemon.sim.trace import TraceRow
 
 OVERSHOOT_DEG = 0.002
 ORDINARY_TRACKING_DEG = 0.02
-FOLLOWING_S = 0.025  # ICD section 5
+FOLLOWING_S = 0.025  # docs/protocol.md, Servo
 EPS = 1e-9
 
 

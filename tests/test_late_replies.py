@@ -1,4 +1,4 @@
-"""Replies that come behind their deadline: never taken for the next one's, never fitted, and told (ICD section 1)."""
+"""Replies that come behind their deadline: never the next one's, never fitted, and told (docs/protocol.md)."""
 
 import asyncio
 from collections.abc import Iterator

@@ -207,7 +207,7 @@ def test_a_link_that_breaks_in_mid_write_is_no_exception_but_a_failed_exchange()
 def test_at_9600_baud_there_is_room_for_a_second_exchange_only_while_the_acu_is_quick(
     latency_s: float, has_room: bool
 ) -> None:
-    """ICD section 6: both exchanges take 71.7, 87.7 and 107.7 ms at 2, 10 and 20 ms latency."""
+    """docs/protocol.md, Timing: both exchanges take 71.7, 87.7 and 107.7 ms at 2, 10 and 20 ms latency."""
 
     async def story(port: AcuPort, _link: MemoryLink, clock: LoopClock) -> None:
         began = clock.monotonic_s()

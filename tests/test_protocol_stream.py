@@ -1,4 +1,4 @@
-"""The wire as a stream: any segmentation, every error row of ICD section 2, both ends back to back, the arithmetic."""
+"""The wire as a stream: any segmentation, docs/protocol.md, Acceptance, row by row, both ends back to back."""
 
 from itertools import pairwise
 
@@ -245,7 +245,7 @@ def test_a_late_reply_is_not_taken_for_the_next_one_but_its_lateness_known() -> 
 
 
 def test_after_a_failed_poll_come_identify_read_registers_and_fault_detail_in_turn() -> None:
-    """ICD section 1, version 2."""
+    """docs/protocol.md, Late replies."""
     host, asked = HostExchange(), []
     for tick in range(8):
         now_s = 0.1 * tick

@@ -1,4 +1,4 @@
-"""Every frame of the ICD's vectors, both directions."""
+"""Every frame of docs/sa3842-vectors.json, both directions."""
 
 import json
 from dataclasses import replace
@@ -42,7 +42,7 @@ from acu_daemon.protocol.sa3842 import (
     encode_reply,
 )
 
-VECTORS = json.loads((Path(__file__).parent / "data" / "sa3842-vectors.json").read_text())
+VECTORS = json.loads((Path(__file__).parents[1] / "docs" / "sa3842-vectors.json").read_text())
 FRAMES = {frame["name"]: bytes.fromhex(frame["hex"]) for frame in VECTORS["frames"]}
 
 AZ_DEG, EL_DEG, TILT_CODE = 123.456, 45.0, 0x04FA

@@ -1,4 +1,4 @@
-"""When the angles of a status were sampled: ICD section 6, time tags."""
+"""When the angles of a status were sampled (docs/protocol.md, Time tags)."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -45,7 +45,7 @@ def test_a_truth_file_thinned_to_every_second_line_gives_the_lines_left_out(name
 
 @needs_data
 def test_between_lines_near_the_zenith_the_azimuth_is_not_linear() -> None:
-    """Design section 8: linear azimuth is wrong by 0.06 deg on the sky at the zenith."""
+    """Linear azimuth is wrong by 0.06 deg on the sky at the zenith."""
     sky = read_truth(DATA / "passes" / "jason-1-Cuiaba-20030108T1414.truth.csv")
     times = [sky.start_tai_s + k for k in range(int(sky.end_tai_s - sky.start_tai_s))]
     looks = [sky.direction(t) for t in times]

@@ -1,4 +1,4 @@
-"""The commands, and the composition root: the only room that chooses real or simulated (design sections 2 and 8)."""
+"""The commands, and the composition root: the only room that chooses real or simulated."""
 
 from acu_daemon.cli.app import main
 

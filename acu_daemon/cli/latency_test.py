@@ -189,7 +189,7 @@ def _link(trial: Trial, station: StationFile | None, link: Link | None) -> Itera
 
 
 def fits(link: Link, period_s: float, latency_s: float, source: str) -> Finding:
-    """Whether a register write each period fits with this latency, and another exchange beside it (ICD section 6)."""
+    """Whether a register write each period fits with this latency, and one beside it (docs/protocol.md, Timing)."""
     allowed_ms = 1e3 * CYCLE_SHARE * period_s
     one_s = cycle_s((WriteAndPoll(0.0, 0.0),), link.byte_time_s, latency_s)
     one_ms, both_ms = 1e3 * one_s, 1e3 * (one_s + (LONGEST_EXTRA + 1) * link.byte_time_s + latency_s)

@@ -1,4 +1,4 @@
-"""One exchange after another with the ACU, and the connection kept alive beside them (ICD sections 1 and 6)."""
+"""One exchange after another with the ACU, and the connection kept alive beside them (docs/protocol.md, Link)."""
 
 import asyncio
 import contextlib
@@ -17,15 +17,15 @@ from acu_daemon.protocol.exchange import HostExchange
 from acu_daemon.protocol.messages import Command, Identity, Poll, Reply, Status, WriteAndPoll
 from acu_daemon.protocol.sa3842 import exchange_bytes, reply_bytes
 
-EXCHANGE_DEADLINE_S = 0.090  # a reply is complete within this of the start of the write, ICD section 1
-CYCLE_SHARE = 0.95  # an exchange goes beside the write only if both fit into this share of the period, ICD section 6
+EXCHANGE_DEADLINE_S = 0.090  # a reply is complete within this of the start of the write: docs/protocol.md, Link
+CYCLE_SHARE = 0.95  # of the period, for a write and an exchange beside it: docs/protocol.md, Timing
 FIRST_BACK_OFF_S = 0.1
 FIRST_POLL_S = 0.6  # so long an open link is asked for its first answer: all four questions, and the poll once more
 LAST_BACK_OFF_S = 1.0  # a pass is short: more than a second of waiting costs more than an attempt
 SHORTEST_WAIT_S = 0.001
 LATENCY_COUNT = 100
 LATE_STEP_MS = 50
-LONGEST_EXTRA = 18  # bytes of the longest housekeeping exchange that goes beside a write, ICD section 6
+LONGEST_EXTRA = 18  # bytes of the longest housekeeping exchange that goes beside a write: docs/protocol.md, Timing
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +101,7 @@ class AcuPort:
 
     @property
     def has_room(self) -> bool:
-        """Whether the computed cycle leaves room for a second exchange beside the write (ICD section 6)."""
+        """Whether the computed cycle leaves room for a second exchange beside the write (docs/protocol.md, Timing)."""
         return self.both_s <= CYCLE_SHARE * self._period_s
 
     @property
@@ -142,7 +142,7 @@ class AcuPort:
         return Answer(reply, started_tai_s, first_byte_tai_s, self._exchange.is_sure)
 
     def question(self) -> Command | None:
-        """A poll, or what may stand in its place after a failed exchange; None: nothing may yet (ICD section 1)."""
+        """A poll, or what may stand in its place; None: nothing may yet (docs/protocol.md, Late replies)."""
         return self._exchange.question(self._clock.monotonic_s())
 
     async def ask(self) -> Answer | None:
@@ -175,7 +175,7 @@ class AcuPort:
                 return answer.reply
 
     async def idle_gap(self) -> None:
-        """Leave 10 idle bit times before the next command (ICD section 1)."""
+        """Leave 10 idle bit times before the next command (docs/protocol.md, Link)."""
         if self._link.byte_time_s > 0:
             await asyncio.sleep(self._link.byte_time_s)
 

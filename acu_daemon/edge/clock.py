@@ -1,4 +1,4 @@
-"""The clocks: CLOCK_MONOTONIC for intervals, TAI through one slowly followed offset for the sky (design section 5)."""
+"""The clocks: CLOCK_MONOTONIC for intervals, TAI through one slowly followed offset for the sky."""
 
 import asyncio
 import contextlib

@@ -1,4 +1,4 @@
-"""The fit runner: a spawned, niced child process, or inline with a fixed virtual latency (design section 2).
+"""The fit runner: a spawned, niced child process, or inline with a fixed virtual latency.
 
 The foreground never waits for it; a child that dies or hangs is replaced and given the pass's readings again.
 """

@@ -1,4 +1,4 @@
-"""The seam between the daemon and the ACU's bytes, and the choice of the link by its URL (ICD section 1)."""
+"""The seam between the daemon and the ACU's bytes, and the choice of the link by its URL (docs/protocol.md, Link)."""
 
 import math
 import time
@@ -15,7 +15,7 @@ from acu_daemon.protocol.sa3842 import cycle_s, exchange_bytes
 BITS_PER_CHARACTER = 10  # start, 8N1 or 7E1, stop
 DEFAULT_BAUD = 9600
 BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
-CYCLE_SHARE = 0.95  # of the period, ICD section 6
+CYCLE_SHARE = 0.95  # of the period: docs/protocol.md, Timing
 EXPECTED = "expected tcp://HOST:PORT, tcp://HOST:PORT?baud=9600 or serial:///dev/ttyUSB0?baud=9600&format=8N1"
 
 
@@ -81,7 +81,7 @@ async def open_once(link: Link) -> None:
 
 
 def check_rate(link: Link, period_s: float, device_delay_s: float) -> None:
-    """Check that WRITE AND STATUS fits into the period (ICD section 6).  UsageError: no, with the arithmetic."""
+    """Check that WRITE AND STATUS fits the period (docs/protocol.md, Timing).  UsageError: no, with the arithmetic."""
     command = WriteAndPoll(0.0, 0.0)
     needed_s = cycle_s((command,), link.byte_time_s, device_delay_s)
     allowed_s = CYCLE_SHARE * period_s

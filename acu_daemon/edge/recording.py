@@ -1,4 +1,4 @@
-"""Readings CSV: written by `run --record`, read by `replay` (design section 8)."""
+"""Readings CSV: written by `run --record`, read by `replay`."""
 
 import contextlib
 import errno

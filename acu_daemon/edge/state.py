@@ -1,4 +1,4 @@
-"""Where state lives (design section 8): --state, else $STATE_DIRECTORY, else acu-daemon in the XDG state home."""
+"""Where state lives (docs/service.md): --state, else $STATE_DIRECTORY, else acu-daemon in the XDG state home."""
 
 import json
 import os

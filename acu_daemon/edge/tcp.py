@@ -1,4 +1,4 @@
-"""The ACU's bytes over TCP (ICD section 1)."""
+"""The ACU's bytes over TCP (docs/protocol.md, Link)."""
 
 import asyncio
 import contextlib

@@ -95,7 +95,8 @@ def nearest_turn(az_deg: float, near_deg: float, limits: AxisLimits) -> float | 
 
 
 def sector_for(az_deg: float, limits: AxisLimits) -> int:
-    """Give the ACU's parameter S for a wanted continuous angle: 1 low half of the wrap, 2 high (ICD sections 4, 5)."""
+    """Give the ACU's parameter S for a wanted continuous angle: 1 low half of the wrap, 2 high (docs/protocol.md,
+    Parameters)."""
     return 2 if az_deg >= middle_deg(limits) else 1
 
 
@@ -119,7 +120,8 @@ def encoder_continuous(
     near_deg: float | None = None,
     end: int = 0,
 ) -> float:
-    """Turn an encoder azimuth in [0, 360) into the continuous angle within the soft limits (ICD sections 3, 5).
+    """Turn an encoder azimuth in [0, 360) into the continuous angle within the soft limits (docs/protocol.md,
+    Behaviour).
 
     end: +1 at the clockwise limit switch, -1 at the other, if the bearing is that of the end.  near_deg: where the axis
     was a moment ago; no drive makes a turn in a moment, so it decides next.  Else the only turn inside the limits is

@@ -1,1 +1,1 @@
-"""The ACU on the wire, ICD sections 2 to 4, both sides.  Pure."""
+"""The ACU on the wire, both sides (docs/protocol.md).  Pure."""

@@ -1,4 +1,4 @@
-"""Angles as the wire carries them: 16-bit binary angles, LSB 360/65536 deg (ICD section 3).
+"""Angles as the wire carries them: 16-bit binary angles, LSB 360/65536 deg (docs/protocol.md, Encodings).
 
 A signed code is a plain count of LSBs and may lie in any turn; a wire code is the same count modulo 65536.
 Multiples of the LSB are exact in a float, so code -> degrees -> code loses nothing.
@@ -39,7 +39,8 @@ def elevation_deg(code: int) -> float:
 
 
 def clamp_code(angle_deg: float, min_deg: float, max_deg: float) -> int:
-    """Signed code nearest to an angle whose rounded value still lies within the limits (ICD section 2, last paragraph).
+    """Signed code nearest to an angle whose rounded value still lies within the limits (docs/protocol.md,
+    Encodings).
 
     The azimuth is the continuous one, in the frame of its limits.  ValueError: no code lies between the limits.
     """

@@ -1,4 +1,4 @@
-"""One outstanding command at a time, without IO, and what may follow one that stayed unanswered (ICD sections 1 and 2).
+"""One outstanding command at a time, and what may follow one without a reply (docs/protocol.md, Late replies).  No IO.
 
 No reply says which of two equal commands it answers.  So a late one is kept from being taken for the next by CMD alone:
 after a failed exchange comes a command whose CMD nothing left unanswered in the last LATE_S has, and a reply with

@@ -1,10 +1,10 @@
-"""Fields of the wire's data: upper-case hex and status nibbles (ICD section 3)."""
+"""Fields of the wire's data: upper-case hex and status nibbles (docs/protocol.md, Encodings)."""
 
 HEX_DIGITS = frozenset("0123456789ABCDEF")
 
 
 class FieldError(ValueError):
-    """A field does not read as the ICD says."""
+    """A field does not read as docs/protocol.md says."""
 
 
 def hex_text(code: int, digit_count: int) -> str:

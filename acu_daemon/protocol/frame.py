@@ -1,4 +1,4 @@
-"""Frames of the SA-3842 wire, both directions, cut anywhere (ICD section 2).
+"""Frames of the SA-3842 wire, both directions, cut anywhere (docs/protocol.md, Frame).
 
     command  STX ADDR CMD [data] ETX CHK
     reply    ACK ADDR CMD [data] ETX CHK

@@ -1,4 +1,4 @@
-"""What host and ACU say to each other, as frozen values (ICD sections 3 and 4).
+"""What host and ACU say to each other, as frozen values (docs/protocol.md, Status block and Messages).
 
 Angles are degrees in the encoder frame.  The tilt of a command is a wire code, since the host sends back the register
 it once read, unchanged.
@@ -104,7 +104,7 @@ class ReadParameter:
 
 @dataclass(frozen=True, slots=True)
 class WriteParameter:
-    """Set a parameter to a 16-bit code (ICD section 4: times 0.02 s, angles 360/65536 deg, threshold 0.05 dB)."""
+    """Set a parameter to a 16-bit code (docs/protocol.md, Parameters: 0.02 s, 360/65536 deg, 0.05 dB)."""
 
     name: str
     code: int
@@ -176,7 +176,7 @@ class Status:
 
     @property
     def follows_registers(self) -> bool:
-        """Whether a register write moves the antenna in this mode (ICD section 5)."""
+        """Whether a register write moves the antenna in this mode (docs/protocol.md, Behaviour)."""
         return self.mode in (AcuMode.REMOTE, AcuMode.REMOTE_BACKUP) or (
             self.mode is AcuMode.ACQUIRE and self.backup_selected is Backup.REMOTE
         )
@@ -201,7 +201,7 @@ class Identity:
 
     @property
     def is_known(self) -> bool:
-        """Whether the ICD names it; two characters that changed alike never make a simulated one of a real one."""
+        """Whether docs/protocol.md names it; two characters that changed alike make no simulated one of a real one."""
         return self.model == "3842" and self.variant in ("10", "20", "S1", "S2")
 
     @property
@@ -228,7 +228,7 @@ class Nak:
 
 @dataclass(frozen=True, slots=True)
 class Faults:
-    """Fault detail: eight nibbles as the ICD, section 4, orders them."""
+    """Fault detail: eight nibbles in the order of docs/protocol.md, Fault detail."""
 
     azimuth: int = 0
     elevation: int = 0

@@ -1,4 +1,4 @@
-"""Codec of the SA-3842's messages, host side and ACU side, without IO (ICD sections 2 to 4).
+"""Codec of the SA-3842's messages, host side and ACU side, without IO (docs/protocol.md).
 
 Whoever wants another dialect replaces this module and keeps `messages`.
 """
@@ -244,7 +244,7 @@ def _command_event(frame: Frame) -> CommandEvent:
 
 
 def exchange_bytes(command: Command) -> tuple[int, int]:
-    """Bytes of a command's frame and of its good reply, for the arithmetic of ICD section 6."""
+    """Bytes of a command's frame and of its good reply, for the arithmetic of docs/protocol.md, Timing."""
     return OVERHEAD_BYTES + len(_command_data(command)), reply_bytes(command)
 
 
@@ -254,7 +254,8 @@ def reply_bytes(command: Command) -> int:
 
 
 def cycle_s(commands: tuple[Command, ...], byte_time_s: float, latency_s: float) -> float:
-    """Time that exchanges take one after the other: wire, one idle character and the latency each (ICD section 6)."""
+    """Time that exchanges take one after the other: wire, one idle character and the latency each (docs/protocol.md,
+    Timing)."""
     byte_count = sum(sum(exchange_bytes(command)) for command in commands)
     return (byte_count + len(commands)) * byte_time_s + len(commands) * latency_s
 

@@ -1,4 +1,4 @@
-"""The 23 characters of the status block (ICD section 3).  A malformed block raises FieldError."""
+"""The 23 characters of the status block (docs/protocol.md, Status block).  A malformed block raises FieldError."""
 
 from functools import lru_cache
 from typing import Any

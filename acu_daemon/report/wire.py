@@ -14,7 +14,7 @@ from acu_daemon.protocol.angles import LSB_DEG
 from acu_daemon.report.trace import Trace
 from acu_daemon.units import Array, wrap_180
 
-HALF_SERVO_TICK_S = 0.010  # ICD section 6: a write waits for half a servo tick on average
+HALF_SERVO_TICK_S = 0.010  # docs/protocol.md, Time tags: a write waits for half a servo tick on average
 PERIOD_S = 0.100  # of the writes; one that comes soon after a late one was still meant for its own tick
 LONG_GAP_S = 0.120
 SETTLE_S = 10.0  # registers count this long after autotrack began

@@ -1,4 +1,4 @@
-"""SIMULATION of the whole ACU with pedestal, receiver and sky, without IO (ICD sections 3 to 5).
+"""SIMULATION of the whole ACU with pedestal, receiver and sky, without IO (docs/protocol.md).
 
 Time is TAI seconds; the servo ticks at 50 Hz from start_tai_s on and is stepped lazily up to the time of each call.
 Angles are in the encoder frame, azimuth continuous; the beam points to encoder minus bias.

@@ -10,7 +10,7 @@ from acu_daemon.sim.fault_board import FaultBoard
 from acu_daemon.sim.fault_verbs import VERBS, Fault, VerbName
 from acu_daemon.sim.pedestal import Axis, AxisTrouble
 
-EMERGENCY_STOP_BIT = 0  # of the interlock nibble, ICD section 4
+EMERGENCY_STOP_BIT = 0  # of the interlock nibble: docs/protocol.md, Fault detail
 
 Act = Callable[[FakeAcu, Fault, bool, float], None]
 

@@ -1,4 +1,4 @@
-"""SIMULATION of what the ACU shows: the status block, and the flags whose change it reports (ICD section 3)."""
+"""SIMULATION of what the ACU shows: status block, and flags that it watches (docs/protocol.md, Status block)."""
 
 from acu_daemon.protocol.messages import AcuMode, Faults, Status
 from acu_daemon.sim.antenna import Antenna

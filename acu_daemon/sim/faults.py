@@ -1,4 +1,4 @@
-"""SIMULATION of the ACU's faults: what is wrong, and what is remembered until FAULT RESET (ICD sections 3 and 4)."""
+"""SIMULATION of the ACU's faults: what is wrong, what stays until FAULT RESET (docs/protocol.md, Fault detail)."""
 
 from dataclasses import fields, replace
 from typing import Literal

@@ -11,7 +11,7 @@ from acu_daemon.sim.fault_verbs import Direction, Fault, VerbName
 HEX_DIGITS = b"0123456789ABCDEF"
 NIBBLES = bytes(range(0x30, 0x40))
 DATA_FROM = 3  # start, ADDR, CMD
-ANGLES_CHARS = 15  # az4 el4 tl4 agc3 are hex digits, what follows in a status are nibbles (ICD section 3)
+ANGLES_CHARS = 15  # az4 el4 tl4 agc3 are hex digits, then nibbles: docs/protocol.md, Status block
 OUT_OF_RANGE = b"6000"  # 135 deg
 IDLE_S = 0.020  # a frame that stops for this long is passed on as it is
 _TRIES = 64

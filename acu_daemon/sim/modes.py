@@ -1,4 +1,4 @@
-"""SIMULATION of the ACU's modes: autotrack, its backups and their timers (ICD section 5).  Knows no angles."""
+"""SIMULATION of the ACU's modes: autotrack, its backups and their timers (docs/protocol.md, Behaviour).  No angles."""
 
 from acu_daemon.protocol.messages import AcuMode, Backup
 from acu_daemon.sim.parameters import Parameters

@@ -1,4 +1,4 @@
-"""SIMULATION of the parameters of 3Bh/3Ch: names, codes, power-up values and ranges (ICD sections 4 and 5)."""
+"""SIMULATION of the parameters of 3Bh/3Ch: names, codes, power-up values and ranges (docs/protocol.md, Parameters)."""
 
 from acu_daemon.model import AxisLimits
 from acu_daemon.protocol.angles import elevation_deg

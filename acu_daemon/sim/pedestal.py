@@ -1,4 +1,4 @@
-"""SIMULATION of the pedestal: an axis with velocity and acceleration limits, driven at 50 Hz (ICD section 5).
+"""SIMULATION of the pedestal: an axis with velocity and acceleration limits, driven at 50 Hz (docs/protocol.md, Servo).
 
 Angles are those of the encoder, continuous through north.  Between two steps an axis moves at a constant rate.
 """

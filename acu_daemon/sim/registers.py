@@ -1,4 +1,4 @@
-"""SIMULATION of the command registers: last write wins, handed to the servo every 80 ms at most (ICD section 5)."""
+"""SIMULATION of the command registers: the last write wins, every 80 ms at most (docs/protocol.md, Behaviour)."""
 
 from math import ceil, floor
 

@@ -1,4 +1,4 @@
-"""SIMULATION of the ACU's end of a TCP connection, with its faults (ICD section 1); sim.pty has that of a terminal.
+"""SIMULATION of the ACU's end of a TCP connection, with its faults (docs/protocol.md, Link); sim.pty has a terminal's.
 
 What stands behind it, the fake ACU or the way to a real one, is a Peer.
 """

@@ -72,7 +72,7 @@ class DirectionTable:
 
 
 def read_truth(path: Path) -> DirectionTable:
-    """Read a truth CSV (design section 8).  UsageError: names file and line."""
+    """Read a truth CSV (TRUTH_HEADER).  UsageError: names file and line."""
     rows: list[tuple[float, float, float, float]] = []
     try:
         file = path.open(newline="", encoding="utf-8", errors="replace")
