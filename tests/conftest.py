@@ -1,8 +1,11 @@
 """What every test shares: where the real data lies, and the rule that no task may leak."""
 
 import asyncio
+import atexit
 import os
+import shutil
 import signal
+import tempfile
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -18,6 +21,9 @@ DATA = SHARED / "data"
 
 os.umask(0o022)  # whatever the caller's is: it decides who may write the files of the tests
 os.environ.setdefault("MPLCONFIGDIR", str(PROJECT / ".pytest_cache" / "matplotlib"))  # no cache in anybody's home
+
+os.environ["XDG_RUNTIME_DIR"] = tempfile.mkdtemp(prefix="acu-daemon-")  # clocks of rehearsals: of these tests alone
+atexit.register(shutil.rmtree, os.environ["XDG_RUNTIME_DIR"], ignore_errors=True)
 
 for number in (signal.SIGINT, signal.SIGHUP, signal.SIGQUIT):  # which nohup and a shell's background have ignored,
     if signal.getsignal(number) is signal.SIG_IGN:  # and what the tests start would inherit that

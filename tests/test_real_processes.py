@@ -173,6 +173,38 @@ def test_without_an_acu_the_run_ends_with_status_3_and_says_what_to_check(rig: A
     )
 
 
+def test_in_two_terminals_either_side_is_stopped_and_started_in_mid_rehearsal_with_no_numbers_to_copy(rig: Any) -> None:
+    words = rig.arguments
+
+    def without_numbers(command: str) -> list[str]:
+        return [word for word in words(command) if word != "--at-monotonic" and word != f"{rig.at_monotonic_s:.6f}"]
+
+    rig.arguments = without_numbers
+    rig.start_acu()
+    time.sleep(HELD_S)  # as a person takes to the second terminal
+    rig.start_daemon()
+    wait_until(lambda: rig.state == "AUTOTRACK/FITTED")
+    (told,) = rig.events("rehearsal.clock")
+    assert f"that of the simulator (process {rig.acu.pid}), now " in told["clock"]
+    rig.acu.kill()
+    rig.acu.wait()
+    rig.acu.stdout.close()
+    wait_until(lambda: rig.state == "LINK-LOST")
+    rig.start_acu()
+    assert f"that of the daemon (process {rig.daemon.pid}), now " in (rig.directory / "acu.err").read_text()
+    wait_until(lambda: rig.state == "AUTOTRACK/FITTED")
+    rig.daemon.kill()
+    rig.daemon.wait()
+    rig.start_daemon()
+    wait_until(lambda: rig.state == "AUTOTRACK/FITTED")
+    assert rig.events("run.resumed")  # the same rehearsal
+    rig.daemon.send_signal(signal.SIGTERM)
+    assert rig.daemon.wait(PATIENCE_S) == 0
+    (done,) = rig.events("run.done")
+    assert done["has_acquired"]
+    assert not rig.events("fit.note")  # no blame on the elements: their satellite is where the simulator has it
+
+
 def test_an_acu_that_dies_and_comes_back_is_steered_on_without_a_signal(rig: Any) -> None:
     rig.start_acu()
     rig.start_daemon()

@@ -6,11 +6,14 @@ from typing import Annotated
 
 import typer
 
-from acu_daemon.cli.options import At, AtMonotonic, Config, Satellite, load_target, make_clock, nearest_to_pass
+from acu_daemon.cli.options import At, AtMonotonic, Config, Satellite, load_target, nearest_to_pass
+from acu_daemon.cli.rehearsal import clock_text, meet_in_rehearsal
 from acu_daemon.cli.serving import Control, Place, parse_place, serve_until_stopped
+from acu_daemon.config import load_station
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.link import BITS_PER_CHARACTER, DEFAULT_BAUD, make_link
 from acu_daemon.edge.loop import run_loop
+from acu_daemon.edge.rehearsal_clock import Meeting, Role
 from acu_daemon.errors import UsageError
 from acu_daemon.protocol.sa3842 import address_byte
 from acu_daemon.sim.acu import FakeAcu
@@ -64,14 +67,18 @@ def command(
     live, one line in, one line out:  echo 'fault no-reply count=3' | nc 127.0.0.1 3900;  `help` lists all verbs.
 
     Prints `listening tcp://HOST:PORT` (or the link of the pseudo terminal) when it is ready; ends on SIGTERM or Ctrl-C.
-    Run the daemon beside it with the same --at and --at-monotonic, so that both share one clock.
+    Run the daemon beside it with the same --at: whichever starts first, on one machine both share its clock, and either
+    can be ended and started again in mid-rehearsal.
 
     A scenario holds [sky] along_track_s, delta_raan_deg; [encoder] azimuth_bias_deg, elevation_bias_deg, noise_deg;
     [receiver] peak_agc_db, agc_noise_db, tracking_noise_deg; [acu] has_tilt, reply_latency_s, mode, azimuth_deg,
     elevation_deg, sector_bit ("driven", "undriven", "random", "stuck-0", "stuck-1"); and any number of [[loss]] with
     cause ("receiver", "silence-zone", "fade"), and start_s, duration_s or from_utc, to_utc; and [[fault]], as above.
     """
-    clock = make_clock(at, at_monotonic)
+    if listen is not None and pty is not None:
+        raise UsageError("--listen and --pty exclude each other")
+    place = _where(listen, pty, load_station(config).acu.url)
+    clock, met = meet_in_rehearsal(place.url, Role.ACU, at, at_monotonic)
     target = load_target(config, satellite, clock.tai_s(), is_strict=False)
     target = nearest_to_pass(config, satellite, target, clock.tai_s(), is_strict=False)  # as the daemon chooses
     station = target.station
@@ -90,15 +97,20 @@ def command(
     for text in target.elements.errors:
         typer.echo(f"warning: {text}", err=True)
     typer.echo(f"SIMULATION of an SA-3842 for {target.elements.label} over {station.station.name}", err=True)
-    if listen is not None and pty is not None:
-        raise UsageError("--listen and --pty exclude each other")
-    url = station.acu.url
     with contextlib.ExitStack() as files:
+        files.callback(lambda: met.close())
+        _tell_clock(met, clock)
         if trace is not None:
             acu.observer = files.enter_context(TraceWriter(trace)).add
         if wire_log is not None:
             acu.on_write = files.enter_context(WireLogWriter(wire_log)).add
-        run_loop(_serve, acu, clock, _where(listen, pty, url), control)
+        run_loop(_serve, acu, clock, place, control, met)
+
+
+def _tell_clock(met: Meeting, clock: SystemClock) -> None:
+    if met.clock.at_tai_s is not None or met.other is not None:
+        text, is_warning = clock_text(met, Role.ACU, clock.monotonic_s())
+        typer.echo(f"{'warning: ' if is_warning else ''}REHEARSAL clock: {text}", err=True)
 
 
 def _where(listen: str | None, pty: Path | None, url: str) -> Place:
@@ -111,11 +123,11 @@ def _where(listen: str | None, pty: Path | None, url: str) -> Place:
     return Place(*parse_place("--listen", listen or url.removeprefix("tcp://").split("?")[0]))
 
 
-async def _serve(acu: FakeAcu, clock: SystemClock, place: Place, control: str | None) -> None:
+async def _serve(acu: FakeAcu, clock: SystemClock, place: Place, control: str | None, met: Meeting) -> None:
     board = FaultBoard(FRAME_VERBS | PEDESTAL_VERBS | place.line_verbs)
     break_acu(acu, board, clock)
     peer, faults = acu_peer(acu, clock, board, place.baud), acu.parts.scenario.faults
     try:
-        await serve_until_stopped(peer, board, place, control, faults, lambda: keep_time(acu, clock))
+        await serve_until_stopped(peer, board, place, control, faults, lambda: keep_time(acu, clock), met.move_to)
     finally:
         acu.advance(clock.tai_s() + ADVANCE_S)  # the trace's last line shows how the antenna was left

@@ -1,5 +1,6 @@
 """`acu-daemon fault-proxy`: a line between daemon and ACU that goes wrong when it is told to."""
 
+import contextlib
 from pathlib import Path
 from typing import Annotated
 
@@ -8,6 +9,7 @@ import typer
 from acu_daemon.cli.serving import Control, Place, parse_place, serve_until_stopped
 from acu_daemon.edge.link import BITS_PER_CHARACTER, DEFAULT_BAUD, Link, make_link
 from acu_daemon.edge.loop import run_loop
+from acu_daemon.edge.rehearsal_clock import lead
 from acu_daemon.errors import UsageError
 from acu_daemon.sim.fault_board import FaultBoard
 from acu_daemon.sim.fault_verbs import FRAME_VERBS, Fault
@@ -52,11 +54,19 @@ def command(
 
 async def _serve(to: str, place: Place, control: str | None, faults: tuple[Fault, ...]) -> None:
     board = FaultBoard(FRAME_VERBS | place.line_verbs)
-    await serve_until_stopped(proxy_peer(lambda: _link(to), board), board, place, control, faults)
+    peer = proxy_peer(lambda: _link(to), board)
+    with contextlib.ExitStack() as ends:
+
+        def stand(where: str) -> None:
+            ends.enter_context(lead(where, _url(to)))
+
+        await serve_until_stopped(peer, board, place, control, faults, on_listening=stand)
 
 
 def _link(to: str) -> Link:
     """The link of --to, not yet open."""
-    if "://" in to:
-        return make_link(to)
-    return make_link(f"serial://{to}" if to.startswith("/") else f"tcp://{to}")
+    return make_link(_url(to))
+
+
+def _url(to: str) -> str:
+    return to if "://" in to else f"serial://{to}" if to.startswith("/") else f"tcp://{to}"

@@ -31,10 +31,10 @@ from acu_daemon.cli.options import (
     coming_pass,
     ending,
     load_target,
-    make_clock,
     nearest_to_pass,
 )
-from acu_daemon.config import control_config, estimator_settings
+from acu_daemon.cli.rehearsal import clock_text, meet_in_rehearsal, met_by_chance
+from acu_daemon.config import control_config, estimator_settings, load_station
 from acu_daemon.control.refit import RefitSetup
 from acu_daemon.control.state import ControlState
 from acu_daemon.daemon.background import fit_deadline_s
@@ -51,6 +51,7 @@ from acu_daemon.edge.link import Link, check_rate, make_link
 from acu_daemon.edge.logs import configure_logs, tell_dropped, tell_loop_problem, tell_signal
 from acu_daemon.edge.loop import loop_runner
 from acu_daemon.edge.recording import RecordingWriter
+from acu_daemon.edge.rehearsal_clock import Meeting, Role
 from acu_daemon.edge.scheduling import keep_to_this_thread, scheduling_text
 from acu_daemon.edge.signals import STOPS, take_signals
 from acu_daemon.edge.state import SnapshotFile, state_directory
@@ -115,12 +116,13 @@ def command(
         faulthandler.enable(STDERR)  # the service's watchdog ends a hung daemon by SIGABRT: say where it hung
     keep_to_this_thread()
     check_duration(duration)
-    clock = make_clock(at, at_monotonic)
+    clock, met = meet_in_rehearsal("" if at is None else load_station(config).acu.url, Role.DAEMON, at, at_monotonic)
     end_s = math.inf if duration is None else PROCESS_START_S + duration
     with contextlib.ExitStack() as ends:
         output, files = Writer("log", on_drained=tell_dropped), Writer("files")
         ends.callback(output.close)
         ends.callback(files.close)
+        ends.callback(met.close)
         live = LiveLine(QueuedStream(sys.stderr, output)) if sys.stderr.isatty() else None
         configure_logs(
             clock.tai_s,
@@ -134,6 +136,7 @@ def command(
             return
         target = _load(config, satellite, clock)
         coming_pass(target, clock.tai_s())
+        _tell_clock(met if clock.is_rehearsal else met_by_chance(target.station.acu.url, clock), clock)
         link = make_link(target.station.acu.url)
         check_rate(link, target.station.acu.period_s, target.station.acu.device_delay_s)
         directory = state_directory(state, is_rehearsal=clock.is_rehearsal)
@@ -147,6 +150,16 @@ def command(
         raise typer.Exit(1)
     if outcome.has_begun and not outcome.has_acquired and outcome.reason not in {number.name for number in STOPS}:
         raise typer.Exit(1)
+
+
+def _tell_clock(met: Meeting, clock: SystemClock) -> None:
+    """Say whose clock a rehearsal has; of a run that is none, that its ACU is a simulator at another time."""
+    text, is_warning = clock_text(met, Role.DAEMON, clock.monotonic_s())
+    log: Any = structlog.get_logger("rehearsal")
+    if is_warning:
+        log.warning("rehearsal.clock", clock=text)
+    elif clock.is_rehearsal:
+        log.info("rehearsal.clock", clock=text)
 
 
 def _load(config: Path, name: str, clock: SystemClock) -> Target:

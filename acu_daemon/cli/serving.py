@@ -39,6 +39,11 @@ class Place:
     baud: int = 0
 
     @property
+    def url(self) -> str:
+        """Where it is found; of port 0, which takes a free one, nothing is known yet."""
+        return f"serial://{self.pty.absolute()}" if self.pty is not None else f"tcp://{self.host}:{self.port}"
+
+    @property
     def line_verbs(self) -> frozenset[VerbName]:
         """The faults of such a line."""
         return PTY_FAULTS if self.pty is not None else TCP_FAULTS
@@ -59,8 +64,12 @@ async def serve_until_stopped(
     control: str | None,
     faults: Iterable[Fault],
     beside: Callable[[], Coroutine[None, None, None]] | None = None,
+    on_listening: Callable[[str], None] | None = None,
 ) -> None:
-    """Serve, say where, and end on a signal; beside: what runs meanwhile.  UsageError: a fault that cannot be had."""
+    """Serve, say where, and end on a signal.  UsageError: a fault that cannot be had.
+
+    beside: what runs meanwhile; on_listening: takes the URL at which it is reached.
+    """
     stopped = asyncio.Event()
     take_signals(asyncio.get_running_loop(), stop=lambda _: stopped.set(), told=lambda _: None)
     async with contextlib.AsyncExitStack() as servers:
@@ -69,6 +78,8 @@ async def serve_until_stopped(
         else:
             where = await servers.enter_async_context(serve_tcp(make_peer, board, place.host, place.port))
         said = f"listening {where}\n"
+        if on_listening is not None:
+            on_listening(where)
         if control is not None:
             at = await servers.enter_async_context(serve_control(board, *parse_place("--control", control)))
             said += f"control {at}\n"
