@@ -48,8 +48,8 @@ AtMonotonic = Annotated[
     typer.Option(
         "--at-monotonic",
         metavar="S",
-        help="The reading of CLOCK_MONOTONIC at which --at holds.  Default: that of the simulator, or of the daemon, at "
-        "the same ACU address on this machine with the same --at; else the start of this process.",
+        help="The reading of CLOCK_MONOTONIC at which --at holds.  Default: that of the simulator, or of the daemon, "
+        "at the same ACU address on this machine with the same --at; else the start of this process.",
     ),
 ]
 
