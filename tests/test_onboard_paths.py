@@ -8,20 +8,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from onboard_tasks import made_task
 from scipy.optimize import linprog
-from scipy.sparse import diags_array, hstack, vstack
+from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from acu_daemon.model import AxisLimits
 from acu_daemon.onboard.bound import is_feasible, least_rate
+from acu_daemon.onboard.branches import find_branches
 from acu_daemon.onboard.cone import Cone, Tube, azimuth_tube, elevation_interval
 from acu_daemon.onboard.frames import Gimbal, angles_between_deg, beam_direction
 from acu_daemon.onboard.free import free_profile
+from acu_daemon.onboard.least_path import Band, least_path
 from acu_daemon.onboard.methods import make_profile
-from acu_daemon.onboard.pointed import fit
+from acu_daemon.onboard.pointed import fit, samples_for
 from acu_daemon.onboard.profile import METHODS, Task, off_pointing, peak_rate_deg_s
 from acu_daemon.onboard.quintic import Knots
 from acu_daemon.onboard.scenarios import DAEJEON
 
 BOUND_SHARE = 1e-6
+PATH_SHARE = 2.5e-3  # the smoothing has 0.2 % of room
 EXACT_DEG = 1e-9
 FIT_DEG = 0.006
 
@@ -145,6 +148,32 @@ def test_limits_of_the_drive_hold_on_the_polynomials() -> None:
     assert peak_rate_deg_s(free.azimuth, task.view) <= limits.max_rate_deg_s
     assert np.abs(free.azimuth.value(task.view.time_s, 2)).max() <= limits.max_acceleration_deg_s2
     assert free_profile(replace(task, azimuth=AxisLimits(-270.0, 270.0, 0.5, 0.05))) is None
+
+
+@pytest.mark.parametrize(("seed", "margin_deg"), [(3, 1.0), (16, 2.0)])
+def test_the_interior_point_finds_the_rate_that_highs_finds_for_the_same_polynomials(
+    seed: int, margin_deg: float
+) -> None:
+    task = made_task(seed, margin_deg)
+    knots = fit(task.view.time_s, task.station_gimbal(task.view), 20.0, 0.1 * margin_deg)[0].knots
+    branch = find_branches(task)[0]
+    at = samples_for(task.view.time_s, knots)
+    time_s, lower, upper = task.view.time_s[at], branch.tube.lower_deg[at], branch.tube.upper_deg[at]
+    ours = least_path(Band(time_s, lower, upper, np.ones(at.size, bool)), knots, branch.guess_deg[at])
+    assert ours is not None
+    values, rates = (np.zeros((at.size, knots.count + 1)) for _ in range(2))
+    columns = 3 * knots.piece_of(time_s)[:, None] + np.arange(6)
+    for matrix, derivative in ((values, 0), (rates, 1)):
+        np.put_along_axis(matrix, columns, knots.basis(time_s, derivative), axis=1)
+    above, below = rates.copy(), -rates
+    above[:, -1] = below[:, -1] = -1.0
+    low, high = np.isfinite(lower), np.isfinite(upper)
+    rows = csr_array(np.vstack([values[high], -values[low], above, below]))
+    bounds = np.concatenate([upper[high], -lower[low], np.zeros(2 * at.size)])
+    aim = np.zeros(knots.count + 1)
+    aim[-1] = 1.0
+    least = linprog(aim, A_ub=rows, b_ub=bounds, bounds=(None, None), method="highs").fun
+    assert np.abs(ours.value(time_s, 1)).max() == pytest.approx(least, rel=PATH_SHARE)
 
 
 def test_fitted_polynomials_follow_the_station() -> None:

@@ -177,7 +177,9 @@ def _alone(found: ParameterFile) -> list[Check]:
 
 def _with_pass(found: ParameterFile, path: Path) -> list[Check]:
     planned = load_pass(path)
-    margin_deg = float(found.header["MARGIN_DEG"]) if "MARGIN_DEG" in found.header else None
+    margin_deg = found.number("MARGIN_DEG")
+    if margin_deg is not None and not 0.0 < margin_deg <= _WIDEST_MARGIN_DEG:
+        raise UsageError(f"MARGIN_DEG = {margin_deg:g}: expected more than 0 and at most {_WIDEST_MARGIN_DEG:g}")
     task = planned.task(margin_deg, (found.start_tai_s, found.start_tai_s + found.end_s))
     checks = check_profile(task, found.profile, planned.file.antenna.play)
     return [*checks, *check_peaks(found), *check_certificate(found, task)]

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from acu_daemon.config_onboard import PassFile, read_pass
-from acu_daemon.edge.elements_file import load_elements
+from acu_daemon.edge.elements_file import LoadedElements, load_elements
 from acu_daemon.errors import AttitudeError, UsageError
 from acu_daemon.model import Pass, Station
 from acu_daemon.onboard.aem import parse_aem
@@ -17,7 +17,7 @@ from acu_daemon.onboard.profile import Task, within
 from acu_daemon.onboard.view import view_pass
 from acu_daemon.orbit.frames import station_itrs_m
 from acu_daemon.orbit.passes import find_passes
-from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.orbit.propagator import Propagator, spans_tai_s
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.units import DAY_S
 
@@ -73,10 +73,7 @@ def load_pass(path: Path) -> PlannedPass:
              OrbitError: the orbit has no answer.
     """
     file = read_pass(path)
-    from_tai_s = file.when.from_utc
-    loaded = load_elements(file.as_satellite, path, from_tai_s, file.site.orientation)
-    if loaded.errors:
-        raise UsageError("\n".join(loaded.errors))
+    loaded = _elements(file, path)
     seen = _first_pass(file, loaded.propagator, loaded.label)
     warnings = list(loaded.warnings)
     attitude: Attitude
@@ -90,6 +87,18 @@ def load_pass(path: Path) -> PlannedPass:
         attitude = plan_attitude(with_nadir(holds, agility, seen.rise_tai_s, seen.set_tai_s), agility)
         imaging = tuple((hold.start_tai_s, hold.end_tai_s) for hold in holds if hold.is_imaging)
     return PlannedPass(file, loaded.label, loaded.propagator, attitude, seen, imaging, warnings)
+
+
+def _elements(file: PassFile, path: Path) -> LoadedElements:
+    """The orbit, judged where the search begins; of an ephemeris that begins later within a day, at its begin."""
+    from_tai_s, orientation = file.when.from_utc, file.site.orientation
+    loaded = load_elements(file.as_satellite, path, from_tai_s, orientation)
+    begins = [start for start, _ in spans_tai_s(loaded.propagator) if from_tai_s < start < from_tai_s + _SEARCH_S]
+    if loaded.errors and begins:
+        loaded = load_elements(file.as_satellite, path, begins[0], orientation)
+    if loaded.errors:
+        raise UsageError("\n".join(loaded.errors))
+    return loaded
 
 
 def _first_pass(file: PassFile, propagator: Propagator, label: str) -> Pass:

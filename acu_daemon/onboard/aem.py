@@ -31,6 +31,7 @@ _LEAST_STATES = 4  # a cubic
 TURN_PER_GAP_DEG = 2.0  # what the body may turn between two states
 SHORT_S, LONGEST_S = 2.0, 30.0  # a gap this short always passes, one longer than that never does
 _MOST_TURN_DEG = 45.0  # between two states, however short the step
+_FAR = 1e3  # no part of a unit quaternion; its square is no overflow
 _NEIGHBOURS = 3  # intervals on either side whose rates a gap is judged by
 
 
@@ -167,7 +168,7 @@ def _quaternions(raw: RawSegment, kind: str, *, is_xml: bool) -> Array:
         quaternion = np.array(rows)
         if not is_xml and raw.fields.get("QUATERNION_TYPE", "LAST").upper() == "FIRST":
             quaternion = np.roll(quaternion, -1, axis=1)
-        size = np.linalg.norm(quaternion, axis=1)
+        size = np.linalg.norm(np.clip(quaternion, -_FAR, _FAR), axis=1)
         off = np.flatnonzero(np.abs(size - 1.0) > 1e-3)
         if off.size:
             raise BadSegmentError(f"a quaternion of length {size[off[0]]:.4f}, expected 1", raw.states[int(off[0])][0])

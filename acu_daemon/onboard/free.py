@@ -18,6 +18,7 @@ PIECES = (  # the longest, s; how near to the station polynomials on them could 
     (5.0, 0.05),
 )
 ELEVATION_GUARD = 0.997  # of the margin, more than azimuth's: where that is at its edge, elevation keeps some room
+SHARES = (1.0, 0.98, 0.95)  # of the margin, in turn: where the axis is near, paths bulge more than the guards foresee
 _GOOD_ENOUGH = 1.007  # times the least rate of the guarded tube: no finer pieces are tried
 
 
@@ -27,7 +28,19 @@ def free_profile(task: Task, objective: Objective = "peak", cap_deg_s: float | N
     objective: "peak", the least largest azimuth rate; "imaging", the least one while the camera works, with
     `cap_deg_s` (default: the drive's rate) for the rest of the pass.
     """
-    branches = find_branches(task)
+    bound = least_bound(task)
+    if bound is None or bound.rate_deg_s > task.azimuth.max_rate_deg_s:
+        return None
+    for share in SHARES:
+        planned = replace(task, cone=replace(task.cone, margin_deg=share * task.margin_deg))
+        if (found := _best(task, planned, objective, cap_deg_s)) is not None:
+            return replace(found, bound=bound)
+    return None
+
+
+def _best(task: Task, planned: Task, objective: Objective, cap_deg_s: float | None) -> Profile | None:
+    """The best path that was planned for one margin and keeps to the other, the task's."""
+    branches = find_branches(planned)
     goal = task.imaging if objective == "imaging" else np.ones(task.view.time_s.size, dtype=bool)
     station = task.station_gimbal(task.view)
     best: tuple[float, Profile] | None = None
@@ -36,15 +49,15 @@ def free_profile(task: Task, objective: Objective = "peak", cap_deg_s: float | N
         for branch in branches:
             if best is not None and objective == "peak" and best[0] <= branch.rate_deg_s:
                 continue
-            profile = _in_branch(task, branch, knots, goal, cap_deg_s)
-            if profile is None:
+            profile = _in_branch(planned, branch, knots, goal, cap_deg_s)
+            if profile is None or not _keeps(task, profile):
                 continue
             cost = _cost(task, profile, objective)
             if best is None or cost < best[0]:
                 best = cost, profile
         if best is not None and (objective == "imaging" or best[0] <= _GOOD_ENOUGH * branches[0].rate_deg_s):
             break
-    return None if best is None else replace(best[1], bound=least_bound(task))
+    return None if best is None else best[1]
 
 
 def _cost(task: Task, profile: Profile, objective: Objective) -> float:
@@ -65,9 +78,7 @@ def _in_branch(task: Task, branch: Branch, knots: Knots, goal: Mask, cap_deg_s: 
     elevation = _elevation(task, azimuth, knots, goal, at)
     if elevation is None:
         return None
-    profile = Profile("free", azimuth, elevation)
-    is_within = off_pointing(task, profile.gimbal(time_s), task.view).max() <= task.margin_deg
-    return profile if is_within and keeps_to_ranges(task, profile) else None
+    return Profile("free", azimuth, elevation)
 
 
 def _elevation(task: Task, azimuth: Path, knots: Knots, goal: Mask, at: Indices) -> Path | None:
@@ -82,10 +93,10 @@ def _elevation(task: Task, azimuth: Path, knots: Knots, goal: Mask, at: Indices)
     return least_path(Band(time_s, lower, upper, aim, *caps(task.elevation)), knots, (lower + upper) / 2.0)
 
 
-def keeps_to_ranges(task: Task, profile: Profile) -> bool:
-    """Whether both angles stay within their ranges at 20 Hz."""
+def _keeps(task: Task, profile: Profile) -> bool:
+    """Whether margin and ranges are kept at 20 Hz."""
     gimbal = profile.gimbal(task.view.time_s)
-    return all(
+    return bool(off_pointing(task, gimbal, task.view).max() <= task.margin_deg) and all(
         bool(((angle >= limits.min_deg - 1e-6) & (angle <= limits.max_deg + 1e-6)).all())
         for angle, limits in ((gimbal.az_deg, task.azimuth), (gimbal.el_deg, task.elevation))
     )

@@ -18,7 +18,7 @@ from acu_daemon.onboard.checks import Check
 from acu_daemon.onboard.profile import METHODS, Method, Profile
 from acu_daemon.onboard.quintic import Path
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
-from acu_daemon.units import Array
+from acu_daemon.units import DAY_S, Array
 
 VERSION = "1"
 _TITLE = "TRACKING_PARAMETER_FILE"
@@ -50,6 +50,13 @@ class ParameterFile:
     def end_s(self) -> float:
         path = self.profile.azimuth
         return float(path.start_s[-1] + path.length_s[-1])
+
+    def number(self, key: str) -> float | None:
+        """A number of the header, None where it has none.  UsageError: it is none."""
+        try:
+            return _number(self.header[key]) if key in self.header else None
+        except ValueError as error:
+            raise UsageError(f"{key}: {error}") from None
 
 
 def write(start_tai_s: float, profile: Profile, about: Mapping[str, str], checks: list[Check]) -> str:
@@ -149,6 +156,8 @@ def _path(rows: list[tuple[float, float, Array]], start_tai_s: float, axis: str,
     if start_s[0] != 0.0 or gaps.size or (length_s <= 0.0).any():
         where = int(gaps[0]) + 2 if gaps.size else 1
         raise ValueError(f"piece {where} of {axis} does not begin where the one before ends")
+    if start_s[-1] + length_s[-1] > DAY_S:
+        raise ValueError("a profile of more than a day is none of a pass")
     return Path(start_s, length_s, np.stack([coefficients for _, _, coefficients in rows]))
 
 

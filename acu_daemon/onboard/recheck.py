@@ -29,9 +29,8 @@ def check_peaks(found: ParameterFile) -> list[Check]:
         ("PEAK_AZIMUTH_RATE_DEG_S", found.profile.azimuth),
         ("PEAK_ELEVATION_RATE_DEG_S", found.profile.elevation),
     ):
-        if key in found.header:
+        if (stated := found.number(key)) is not None:
             peak = float(np.abs(path.value(grid_s(found), 1)).max())
-            stated = float(found.header[key])
             checks.append(Check(key, peak, stated, "deg/s", isclose(peak, stated, rel_tol=_SAME, abs_tol=1e-8)))
     return checks
 

@@ -1,6 +1,7 @@
 """What is said of a tracking profile and of scenarios: lines for people, the header of a file."""
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
 
 import numpy as np
 
@@ -60,6 +61,9 @@ def summary(planned: PlannedPass, task: Task, made: Made, single_deg_s: float) -
             f"{bound.low_deg:.2f} deg at {utc_text(start + bound.low_time_s, 1)[11:]} and at most {bound.high_deg:.2f} "
             f"at {utc_text(start + bound.high_time_s, 1)[11:]}"
         )
+    first = made.first[0]
+    off = f"{first.name} {first.value:.3f} of {first.limit:g} deg{first.detail}"
+    lines.append(f"modified profile, before backlash is led: {off}")
     if task.imaging.any():
         at_s = task.view.time_s[task.imaging]
         azimuth, elevation = (float(np.abs(path.value(at_s, 1)).max()) for path in (profile.azimuth, profile.elevation))
@@ -77,7 +81,8 @@ def scenario_table(rows: Sequence[Row], margin_deg: float) -> list[str]:
     kinds = dict.fromkeys(row.kind for row in rows)
     groups = {kind: [row for row in rows if row.kind == kind] for kind in kinds} | {"all": list(rows)}
     lines += [_line(name, group) for name, group in groups.items()]
-    a = _columns(rows)
+    there = [row for row in rows if isfinite(row.free_deg_s)]
+    a = _columns(there)
     over = a["free"] / a["bound"] - 1.0
     lines += [
         "",
@@ -85,13 +90,15 @@ def scenario_table(rows: Sequence[Row], margin_deg: float) -> list[str]:
         f"median reduction {_median(1.0 - a['search'] / a['three'])}",
         f"free below search: median {_median(1.0 - a['free'] / a['search'])}; "
         f"below three: {_median(1.0 - a['free'] / a['three'])}",
-        f"free above its bound: median {_median(over)}, worst {np.max(over):.2%}",
+        f"free above its bound: median {_median(over)}, worst {np.max(over, initial=0.0):.2%}",
         f"free <= 1.005 search and search <= three: "
         f"{_share((a['free'] <= 1.005 * a['search']) & (a['search'] <= a['three']))}",
         f"samples beyond the margin (20 Hz, all methods): {sum(row.violations for row in rows)}",
         f"processor time of all four methods: median {np.median([row.seconds for row in rows]):.2f} s, "
         f"most {max(row.seconds for row in rows):.2f} s",
     ]
+    if missing := [str(row.seed) for row in rows if not isfinite(row.free_deg_s)]:
+        lines.append(f"no free path within the margin, left out of the shares above: seeds {', '.join(missing)}")
     return lines + _imaging(rows)
 
 
@@ -110,9 +117,9 @@ def _imaging(rows: Sequence[Row]) -> list[str]:
 
 def _line(name: str, rows: Sequence[Row]) -> str:
     a = _columns(rows)
-    medians = "".join(f"{np.median(a[key]):9.3f}" for key in ("single", "three", "search", "free", "bound"))
+    medians = "".join(f"{np.nanmedian(a[key]):9.3f}" for key in ("single", "three", "search", "free", "bound"))
     gain = float(np.mean(a["search"] < (1.0 - GAIN) * a["three"]))
-    return f"{name:16}{len(rows):6}{medians}{gain:13.0%}{float(np.median(a['free'] / a['three'])):12.3f}"
+    return f"{name:16}{len(rows):6}{medians}{gain:13.0%}{float(np.nanmedian(a['free'] / a['three'])):12.3f}"
 
 
 def _columns(rows: Sequence[Row]) -> Mapping[str, Array]:

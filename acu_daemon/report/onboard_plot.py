@@ -147,7 +147,7 @@ def _draw_ground(axes: Axes, task: Task, profile: Profile, station: Station) -> 
     axes.set_aspect("equal")
     axes.set_xlabel("km east of the station")
     axes.set_ylabel("km north")
-    axes.set_title("Where the beam meets the ground, and the margin there at three instants", fontsize=10)
+    axes.set_title("Where the beam meets the ground", fontsize=10)
     axes.legend(frameon=False, fontsize=7, loc="upper left")
 
 
