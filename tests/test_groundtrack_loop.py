@@ -1,4 +1,4 @@
-"""The loop of seed 003: averages, navigators, controllers, and weeks of the whole."""
+"""The loop of Galski and Orlando 2011: averages, navigators, controllers, and weeks of the whole."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ from acu_daemon.groundtrack.smoothing import WINDOW, DriftSmoother, RecursiveAve
 from acu_daemon.groundtrack.storms import with_storms
 from acu_daemon.units import DAY_S
 
-RAW_RMS_M = 202.0  # of the fixes in three dimensions, seed 003 as read in docs/groundtrack.md
+RAW_RMS_M = 202.0  # of the fixes in three dimensions, Galski and Orlando 2011 as read in docs/groundtrack.md
 NAVIGATOR_D_M = 10.0
 NO_RIPPLE = Ripple(90.0, np.zeros((4, 3)))
 PERFECT = Case("moderate", 3900.0, navigator="perfect", days=60.0)

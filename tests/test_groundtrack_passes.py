@@ -118,6 +118,20 @@ def test_recordings_without_a_pass_are_told(tmp_path: Path, files: dict[str, str
     assert said in done.err
 
 
+def test_passes_of_another_satellite_are_left_out_with_a_word(tmp_path: Path) -> None:
+    config = configured(tmp_path)
+    (tmp_path / "other").mkdir()
+    times_s, az_deg, el_deg = passes()[0]
+    backwards = zip(times_s, az_deg[::-1], el_deg[::-1], strict=True)
+    rows = [f"{utc_text(EPOCH_TAI_S + t, 6)},{a % 360.0:.5f},{e:.5f},1" for t, a, e in backwards]
+    (tmp_path / "other" / "a.csv").write_text("\n".join(["utc,az_deg,el_deg,locked", *rows]) + "\n")
+    done = acu_daemon("groundtrack", "from-passes", tmp_path / "other", "--config", config, "--satellite", "made")
+    assert done.code == 2
+    assert "a.csv, pass of 2010-01-01" in done.err
+    assert "left out:" in done.err
+    assert "0 element sets or passes are too few" in done.err
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [(("--flux", "20"), "expected sfu, 50 to 400"), (("--flux", "none.csv"), "neither a file nor one of")],

@@ -45,7 +45,7 @@ COMMANDS = {  # name: module of acu_daemon.cli, and the function in it
 }
 GROUPS: dict[str, Group] = {
     "groundtrack": Group(
-        "Keep a phased satellite's ground track: simulate it (seed 003), or see it in element sets and in passes.",
+        "Keep a phased satellite's ground track: simulate it (Galski and Orlando 2011), see it in elements and passes.",
         {
             "simulate": ("groundtrack_simulate", "command"),
             "reproduce": ("groundtrack_reproduce", "command"),

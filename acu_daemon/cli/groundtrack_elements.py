@@ -1,6 +1,7 @@
 """`acu-daemon groundtrack from-elements`: D and the manoeuvres of a real satellite, from a history of element sets."""
 
 import json
+import os
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -62,14 +63,14 @@ def command(
     found = find_manoeuvres(history)
     if csv is not None:
         write_csv(csv, "utc,d_m", [f"{utc_text(t)},{d:.1f}" for t, d in zip(history.tai_s, history.d_m, strict=True)])
+    if as_json:
+        typer.echo(json.dumps(_as_object(sets[-1], history, found), indent=1))
+    else:
+        _print(sets[-1], history, found)
     if plot is not None:
         from acu_daemon.report.groundtrack import plot_history
 
         plot_history(plot, history, found, sets[-1].label)
-    if as_json:
-        typer.echo(json.dumps(_as_object(sets[-1], history, found), indent=1))
-        return
-    _print(sets[-1], history, found)
 
 
 def parsed_cycle(text: str | None) -> Cycle | None:
@@ -83,10 +84,16 @@ def parsed_cycle(text: str | None) -> Cycle | None:
 
 
 def refuse_unwritable(*paths: Path | None) -> None:
-    """UsageError: a file's directory is not there."""
+    """UsageError: a file cannot be made there; said before the work, not after it."""
     for path in paths:
-        if path is not None and not path.absolute().parent.is_dir():
+        if path is None:
+            continue
+        if not path.absolute().parent.is_dir():
             raise UsageError(f"{path}: there is no directory {path.parent}; make it first")
+        if path.is_dir() or not os.access(path if path.exists() else path.absolute().parent, os.W_OK):
+            raise UsageError(
+                f"{path} cannot be written: {'it is a directory' if path.is_dir() else 'permission denied'}"
+            )
 
 
 def write_csv(path: Path, header: str, rows: list[str]) -> None:

@@ -76,14 +76,14 @@ def command(
     if csv is not None:
         points = zip(history.tai_s, history.d_m, sigma_m, strict=True)
         write_csv(csv, "utc,d_m,sigma_m", [f"{utc_text(t)},{d:.1f},{s:.1f}" for t, d, s in points])
+    if as_json:
+        typer.echo(json.dumps(_as_object(satellite, history, sigma_m, found, ahead), indent=1))
+    else:
+        _print(satellite, history, sigma_m, found, ahead)
     if plot is not None:
         from acu_daemon.report.groundtrack import plot_outlook
 
         plot_outlook(plot, history, sigma_m, found, ahead, satellite)
-    if as_json:
-        typer.echo(json.dumps(_as_object(satellite, history, sigma_m, found, ahead), indent=1))
-        return
-    _print(satellite, history, sigma_m, found, ahead)
 
 
 def _seen(directory: Path, config: Path, satellite: str) -> list[SeenPass]:

@@ -1,4 +1,4 @@
-"""`acu-daemon groundtrack reproduce`: the runs of seed 003, section 3, beside ours, and its figures 2 to 11."""
+"""`acu-daemon groundtrack reproduce`: the runs and figures of Galski and Orlando 2011, beside ours."""
 
 import json
 from collections.abc import Sequence

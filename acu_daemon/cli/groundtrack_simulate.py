@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from acu_daemon.errors import UsageError
+from acu_daemon.cli.groundtrack_elements import refuse_unwritable
 
 TRUE_DEGREE, KNOWN_DEGREE = 20, 12  # of the tesserals: what pulls, and what the table on board has
 
@@ -41,7 +41,7 @@ def command(
         ),
     ] = "moderate",
     band_m: Annotated[float, typer.Option("--band-m", help="Half the band: D is kept within +- this.")] = 3900.0,
-    controller: Annotated[str, typer.Option("--controller", help="ours, or paper (seed 003).")] = "ours",
+    controller: Annotated[str, typer.Option("--controller", help="ours, or paper (Galski and Orlando 2011).")] = "ours",
     navigator: Annotated[
         str,
         typer.Option(
@@ -88,12 +88,12 @@ def command(
     moves it east, a manoeuvre raises the semi-major axis and turns it back.  bound: the number of manoeuvres that
     would do if each parabola filled the band.
     """
+    from acu_daemon.edge.campaign import results_of
     from acu_daemon.edge.flux_file import load_flux
-    from acu_daemon.groundtrack.simulate import Case, check_case, make_world
+    from acu_daemon.groundtrack.simulate import Case, Outcome, check_case, make_world
     from acu_daemon.groundtrack.storms import with_storms
 
-    if plot is not None and not plot.absolute().parent.is_dir():
-        raise UsageError(f"--plot {plot}: there is no directory {plot.parent}; make it first")
+    refuse_unwritable(plot)
     flux = load_flux(profile)
     world = make_world(with_storms(flux, storms, seed) if storms else flux)
     case = Case(
@@ -114,21 +114,21 @@ def command(
     if navigator != "perfect":
         world = with_tesserals(world, is_wanted=tesserals)
     outcomes = _run(world, [replace(case, seed=seed + k) for k in range(runs)], jobs, dask)
+    done = [one for one in outcomes if isinstance(one, Outcome)]
+    if as_json:
+        objects = [as_object(outcome) for outcome in done]
+        typer.echo(json.dumps(objects if runs > 1 else objects[0] if objects else None, indent=1))
+    else:
+        typer.echo("\n".join([HEAD, *(as_row(outcome) for outcome in done)]))
+    results_of(outcomes)  # tells the runs that failed; those that did not are written
     if plot is not None:
         from acu_daemon.report.groundtrack import plot_run
 
-        plot_run(plot, outcomes[0])
-    if as_json:
-        objects = [as_object(outcome) for outcome in outcomes]
-        typer.echo(json.dumps(objects if runs > 1 else objects[0], indent=1))
-        return
-    typer.echo(HEAD)
-    for outcome in outcomes:
-        typer.echo(as_row(outcome))
+        plot_run(plot, done[0])
 
 
 def _run(world: Any, cases: list[Any], jobs: int | None, dask: str | None) -> list[Any]:
-    from acu_daemon.edge.campaign import progress_bar, results_of, run_campaign
+    from acu_daemon.edge.campaign import progress_bar, run_campaign
     from acu_daemon.groundtrack.simulate import simulate
 
     with progress_bar("SIMULATION, days" if len(cases) == 1 else "SIMULATION, runs") as on_done:
@@ -136,9 +136,7 @@ def _run(world: Any, cases: list[Any], jobs: int | None, dask: str | None) -> li
             (case,) = cases
             return [simulate(world, case, on_done and partial(_day_done, on_done, round(case.days)))]
         work = partial(simulate, world)
-        return results_of(
-            run_campaign(work, cases, jobs=jobs, dask=dask, name_of=lambda one: f"seed {one.seed}", on_done=on_done)
-        )
+        return run_campaign(work, cases, jobs=jobs, dask=dask, name_of=lambda one: f"seed {one.seed}", on_done=on_done)
 
 
 HEAD = (

@@ -14,6 +14,7 @@ from acu_daemon.units import EARTH_EQUATORIAL_RADIUS_M, MU_M3_S2, Array
 
 _POINTS = 60  # on a revolution, for its mean elements
 _BUFFER_S = 1.0
+_WORST_SIGMAS = 5.0  # of the residuals
 
 
 class SeenPass(NamedTuple):
@@ -37,6 +38,11 @@ def seen_pass(setup: RefitSetup, readings: Readings) -> SeenPass | str:
     fit = reply.fit
     if fit is None or fit.covariance is None:
         return "no fit: the readings do not determine the orbit better than the elements"
+    noise_deg = max(setup.settings.sigma_azimuth_deg, setup.settings.sigma_elevation_deg)
+    if fit.residual_rms_deg > _WORST_SIGMAS * noise_deg:
+        return f"the readings are {fit.residual_rms_deg:.2f} deg rms off the fit: are they of another satellite?"
+    if fit.rejected_count > fit.reading_count:
+        return f"{fit.rejected_count} of {len(readings)} readings do not fit the others: are they of another satellite?"
     middle_s = float(readings.tai_s[len(readings) // 2])
     source = setup.propagator.corrected(fit.correction)
     mean, revolution_s = _mean_orbit(source, middle_s)

@@ -1,7 +1,8 @@
 """Mean elements of a nearly circular orbit without a singularity, to and from states.
 
-alpha = argp + mean anomaly (seed 003, eq 1); with the true anomaly in its place D has a ripple of 930 m once a
-revolution.  The first-order short-period terms of J2 are removed: left in they are 194 m in D, twice a revolution.
+alpha = argp + mean anomaly (Galski and Orlando 2011, eq 1); with the true anomaly in its place D has a ripple of 930 m
+once a revolution.  The first-order short-period terms of J2 are removed: left in they are 194 m in D, twice a
+revolution.
 """
 
 from typing import NamedTuple

@@ -15,7 +15,7 @@ from acu_daemon.groundtrack.reference import CBERS_CYCLE, ReferenceOrbit, plane_
 from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.units import DAY_S, EARTH_EQUATORIAL_RADIUS_M, EARTH_FLATTENING, Array
 
-STEP_S = 180.0  # of the grid: an observation of D, seed 003, section 3
+STEP_S = 180.0  # of the grid: an observation of D, Galski and Orlando 2011, section 3
 BALLISTIC_M2_KG = 0.0682  # makes the paper's yearly sums; about three times a real CBERS (docs/groundtrack.md)
 EPOCH_TAI_S = tai_from_utc("2010-01-01T00:00:00Z")
 NODE_HOUR = 22.5  # local time of the ascending node: CBERS descends at 10:30

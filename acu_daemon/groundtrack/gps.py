@@ -1,4 +1,4 @@
-"""GPS fixes of a simulated satellite: the truth with the errors of seed 003, section 2.
+"""GPS fixes of a simulated satellite: the truth with the errors of Galski and Orlando 2011, section 2.
 
 Random errors of 100 m and 1 m/s on each axis, and a systematic error that steps each time the set of satellites in
 view changes: every 1 to 15 minutes, about 100 m in length.  In three dimensions that makes 202 m rms.

@@ -1,4 +1,4 @@
-"""The loop of seed 003, figure 1: orbit, GPS, navigator, D, controller, manoeuvre, and round again.
+"""The loop of Galski and Orlando 2011, figure 1: orbit, GPS, navigator, D, controller, manoeuvre, and round again.
 
 Time goes in blocks of fixes.  A block is observed as a whole; where the controller manoeuvres within it, what came
 after is thrown away and observed anew, on the orbit as the manoeuvre left it.

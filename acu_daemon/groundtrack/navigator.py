@@ -160,7 +160,7 @@ class Navigator:
 
 
 def drift_of(reference: ReferenceOrbit, estimates: Array) -> Array:
-    """D in metres, (N,), of estimates as `observe` gives them.  Source: seed 003, eq 1."""
+    """D in metres, (N,), of estimates as `observe` gives them.  Source: Galski and Orlando 2011, eq 1."""
     return reference.drift_m(estimates[:, RAAN], estimates[:, ALPHA])
 
 

@@ -1,4 +1,4 @@
-"""The controller of seed 003: conditions 6 and 7, sizes by eqs 12 and 13, guard, restart.
+"""The controller of Galski and Orlando 2011: conditions 6 and 7, sizes by eqs 12 and 13, guard, restart.
 
 Eq 12's root covers the whole product; eq 11 is not needed.  The acceleration is that of the moment: a size cannot know
 what the 27-day wave of the flux will do, so D overshoots to the west when the flux falls after a manoeuvre.
@@ -66,7 +66,7 @@ class PaperController:
 
 
 class ConstantController:
-    """The controller of Galski et al. 2001 as seed 003 describes it: steps of one size, at most one in a revolution.
+    """The controller of Galski et al. 2001, as the paper of 2011 has it: steps of one size, at most one in a revolution.
 
     Where it aims is not said; here at D = 0: a step is made while smoothed D is east of it and drifts further east.
     """

@@ -1,4 +1,4 @@
-"""The simplified navigator of seed 003 (Galski et al. 2001): an extended Kalman filter at each fix.
+"""The simplified navigator of Galski and Orlando 2011 (Galski et al. 2001): an extended Kalman filter at each fix.
 
 State: position and velocity (TEME) and the systematic error of the receiver's position, which is constant but for a
 random walk.  Dynamics: the point mass and J2, by one Runge-Kutta step from fix to fix; what they leave out, above all

@@ -1,7 +1,7 @@
 """The reference orbit of a phased satellite, and the drift of its ground track against it.
 
-D (seed 003, eq 1) is where the satellite crosses the equator less where the reference orbit does, in metres along the
-equator, **east positive**.  Drag lowers the semi-major axis a, the satellite comes round early, the Earth has turned
+D (Galski and Orlando 2011, eq 1) is where the satellite crosses the equator less where the reference orbit does, in
+metres along the equator, **east positive**.  Drag lowers the semi-major axis a, the satellite comes round early, the Earth has turned
 less below it: D accelerates eastwards.  A manoeuvre that raises a by 1 m changes dD/dt by about -8.45 m/day.
 
 Elements are Brouwer's means; alpha = argp + mean anomaly, and the eccentricity is frozen (perigee over the north).
@@ -32,7 +32,7 @@ class Cycle(NamedTuple):
 
     @property
     def per_day(self) -> float:
-        """N + P/Q of seed 003, eq 1."""
+        """N + P/Q of Galski and Orlando 2011, eq 1."""
         return self.revolutions / self.days
 
     def __str__(self) -> str:
@@ -88,7 +88,7 @@ class ReferenceOrbit:
         return self.by_a.drift * DAY_S
 
     def drift_m(self, delta_raan_rad: Array, delta_alpha_rad: Array) -> Array:
-        """D in metres, east positive.  Source: seed 003, eq 1."""
+        """D in metres, east positive.  Source: Galski and Orlando 2011, eq 1."""
         return EARTH_EQUATORIAL_RADIUS_M * (delta_raan_rad + delta_alpha_rad / self.cycle.per_day)
 
 
@@ -148,13 +148,13 @@ def about(cycle: Cycle, a_m: float, e: float, i_rad: float) -> ReferenceOrbit:
 def micheau_size_m(reference: ReferenceOrbit, drift_change_m_day: float) -> float:
     """Semi-major axis step in metres for a change of dD/dt; positive for a negative change.
 
-    Source:  seed 003, eq 13 (Micheau 1995), T_te = 86400 s: 0.5 % more than the derivative of the secular rates.
+    Source:  Galski and Orlando 2011, eq 13 (Micheau 1995), T_te = 86400 s.  0.5 % more than the secular rates' derivative.
     """
     return -reference.a_m / (3.0 * pi * EARTH_EQUATORIAL_RADIUS_M) * drift_change_m_day
 
 
 def tangential_m_s(reference: ReferenceOrbit, delta_a_m: float) -> float:
-    """Speed that a step of the semi-major axis costs.  Source: seed 003, eq 14."""
+    """Speed that a step of the semi-major axis costs.  Source: Galski and Orlando 2011, eq 14."""
     return delta_a_m / (2.0 * reference.a_m) * reference.speed_m_s
 
 

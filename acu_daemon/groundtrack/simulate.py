@@ -43,7 +43,7 @@ class Windows(NamedTuple):
 
 
 class PaperRun(NamedTuple):
-    """A row of seed 003, section 3: what was run, what came out, and the acceleration's scale that fits the count."""
+    """A run of Galski and Orlando 2011, section 3, what came out, and the acceleration's scale that fits its count."""
 
     profile: str
     band_m: float

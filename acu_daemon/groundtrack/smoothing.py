@@ -1,4 +1,4 @@
-"""The moving averages of seed 003, eqs 2 to 4.
+"""The moving averages of Galski and Orlando 2011, eqs 2 to 4.
 
 Eq 3 keeps two sums alone, so the oldest observation cannot be taken out: what is stored fades by (N-1)/N at each step.
 That is an exponential of the time constant N steps, with a delay of N steps; a true window of N has half of it.
