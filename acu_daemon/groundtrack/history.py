@@ -2,7 +2,8 @@
 
 A phased satellite crosses the equator northwards at R longitudes, 360/R degrees apart.  Where it really crosses,
 folded into one such spacing and unwound, times the Earth's radius, is D (Galski and Orlando 2011, eq 1) but for a
-constant; the median is taken out.  At the node the short-period terms of J2 in the node vanish, so no mean elements are needed.
+constant; the median is taken out.  At the node the short-period terms of J2 in the node vanish, so no mean elements
+are needed.
 """
 
 from collections.abc import Sequence

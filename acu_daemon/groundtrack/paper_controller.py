@@ -66,7 +66,7 @@ class PaperController:
 
 
 class ConstantController:
-    """The controller of Galski et al. 2001, as the paper of 2011 has it: steps of one size, at most one in a revolution.
+    """The controller of Galski et al. 2001, as the paper of 2011 has it: equal steps, at most one in a revolution.
 
     Where it aims is not said; here at D = 0: a step is made while smoothed D is east of it and drifts further east.
     """

@@ -1,7 +1,8 @@
 """D's acceleration by drag as polynomials of F10.7, one for each Kp, fitted to runs of this simulator.
 
 Galski and Orlando 2011, section 1 (Orlando et al. 2009): runs at constant flux and Kp, then a polynomial of the third
-or fourth degree in the flux.  The acceleration spans two decades, so a polynomial of its logarithm is as simple and far nearer.
+or fourth degree in the flux.  The acceleration spans two decades, so a polynomial of its logarithm is as simple and
+far nearer.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,9 @@
 """The reference orbit of a phased satellite, and the drift of its ground track against it.
 
 D (Galski and Orlando 2011, eq 1) is where the satellite crosses the equator less where the reference orbit does, in
-metres along the equator, **east positive**.  Drag lowers the semi-major axis a, the satellite comes round early, the Earth has turned
-less below it: D accelerates eastwards.  A manoeuvre that raises a by 1 m changes dD/dt by about -8.45 m/day.
+metres along the equator, **east positive**.  Drag lowers the semi-major axis a, the satellite comes round early, the
+Earth has turned less below it: D accelerates eastwards.  A manoeuvre that raises a by 1 m changes dD/dt by about
+-8.45 m/day.
 
 Elements are Brouwer's means; alpha = argp + mean anomaly, and the eccentricity is frozen (perigee over the north).
 """
@@ -148,7 +149,7 @@ def about(cycle: Cycle, a_m: float, e: float, i_rad: float) -> ReferenceOrbit:
 def micheau_size_m(reference: ReferenceOrbit, drift_change_m_day: float) -> float:
     """Semi-major axis step in metres for a change of dD/dt; positive for a negative change.
 
-    Source:  Galski and Orlando 2011, eq 13 (Micheau 1995), T_te = 86400 s.  0.5 % more than the secular rates' derivative.
+    Source:  Galski and Orlando 2011, eq 13 (Micheau 1995), T_te = 86400 s; 0.5 % above the secular rates' slope.
     """
     return -reference.a_m / (3.0 * pi * EARTH_EQUATORIAL_RADIUS_M) * drift_change_m_day
 
