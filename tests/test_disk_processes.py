@@ -135,7 +135,7 @@ class Run:
         self.start()
         self.track()
         wait_until(lambda: self.has_told(*TOLD), "all that could not be written was told")
-        status = [*pass_rig.ACU_DAEMON, "status", "--rehearsal", "--state", str(self.rig.directory / "state")]
+        status = [*pass_rig.ACU_DAEMON, "status", "--json", "--rehearsal", "--state", str(self.rig.directory / "state")]
         self.status_text = subprocess.run(status, capture_output=True, text=True, check=True).stdout
         self.kill_and_start()
         self.track()

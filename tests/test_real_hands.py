@@ -23,12 +23,12 @@ def wait_until(is_so: Callable[[], bool]) -> None:
         time.sleep(0.05)
 
 
-def say(rig: Any, word: str) -> Done:
-    return acu_daemon(word, "--state", rig.directory / "state", "--rehearsal")
+def say(rig: Any, word: str, *more: str) -> Done:
+    return acu_daemon(word, *more, "--state", rig.directory / "state", "--rehearsal")
 
 
 def seen(rig: Any) -> dict[str, Any]:
-    done = say(rig, "status")
+    done = say(rig, "status", "--json")
     assert done.code == 0, done.err
     snapshot: dict[str, Any] = json.loads(done.out)
     return snapshot

@@ -1,12 +1,16 @@
 """`acu-daemon arm`, `disarm`, `clear`, `status`: a person's word to the running daemon, over its control socket."""
 
+import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from acu_daemon.daemon.overview import status_lines
+from acu_daemon.daemon.snapshot import snapshot_of
 from acu_daemon.edge.control_socket import ask
 from acu_daemon.edge.state import state_path
+from acu_daemon.errors import AcuDaemonError
 
 State = Annotated[
     Path | None,
@@ -52,9 +56,25 @@ def clear(state: State = None, rehearsal: Rehearsal = False) -> None:
     _say("clear", state, is_rehearsal=rehearsal)
 
 
-def status(state: State = None, rehearsal: Rehearsal = False) -> None:
-    """Print what the running daemon sees and does, as one line of JSON.
+def status(
+    state: State = None,
+    rehearsal: Rehearsal = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="One line of JSON, with every figure; docs/status.md tells each key.")
+    ] = False,
+) -> None:
+    """Print what the running daemon does: the verdict, alarms, the pass, where the antenna points, the prediction.
+
+    `watch -n1 acu-daemon status` is a live view; scripts take --json.
 
     Exit status: 0; 1 no daemon or no permission.
     """
-    _say("status", state, is_rehearsal=rehearsal)
+    answer = ask(state_path(state, is_rehearsal=rehearsal), "status")
+    if as_json:
+        typer.echo(answer)
+        return
+    try:
+        seen = snapshot_of(json.loads(answer))
+    except (ValueError, TypeError) as error:
+        raise AcuDaemonError(f"the daemon runs another version than this command ({error}); see --json") from None
+    typer.echo("\n".join(status_lines(seen)))

@@ -249,6 +249,8 @@ def make_job(
         device_delay_s=station.acu.device_delay_s,
         is_rehearsal=is_rehearsal,
         end_tai_s=end_tai_s,
+        satellite=target.satellite.satellite.name,
+        station=station.station.name,
     )
 
 

@@ -7,8 +7,8 @@ from acu_daemon.control.causes import is_acquired
 from acu_daemon.control.changed import changed
 from acu_daemon.control.state import ControlConfig, ControlState, Event, Observation, PathOffset, Scan, Sky
 from acu_daemon.control.states import AUTOTRACKING, TrackState
-from acu_daemon.control.track_frame import extents, is_within, offset_of
-from acu_daemon.model import Reading
+from acu_daemon.control.track_frame import beside, extents, is_within, offset_of
+from acu_daemon.model import Pointing, Reading
 
 GAIN = 0.6  # of the newest reading in the smoothed offset: autotrack pulls in quickly
 
@@ -67,3 +67,13 @@ def _learn_offset(
     if old is not None and old.model is prediction.model:
         new = old.along_s + GAIN * (new[0] - old.along_s), old.across_deg + GAIN * (new[1] - old.across_deg)
     return changed(state, offset=PathOffset(*new, prediction.model), is_offset_refused=False)
+
+
+def learned_point(state: ControlState, sky: Sky, tai_s: float, *, follow: bool) -> Pointing | None:
+    """The path as autotrack showed it before the first fit; None: as it is predicted."""
+    offset, prediction = state.offset, sky.prediction
+    if offset is None or prediction is None or offset.model is not prediction.model:
+        return None
+    if state.track not in (TrackState.AUTOTRACK_TLE, TrackState.HOLD_TLE):
+        return None
+    return beside(prediction, tai_s, (offset.along_s, offset.across_deg), follow=follow)

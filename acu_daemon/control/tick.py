@@ -27,7 +27,7 @@ from acu_daemon.control.hands import (
     watch_antenna,
 )
 from acu_daemon.control.modes import wanted_mode_command
-from acu_daemon.control.path_offset import forget_other_pass, learn_of_signal
+from acu_daemon.control.path_offset import forget_other_pass, learn_of_signal, learned_point
 from acu_daemon.control.relearn import watch_turn
 from acu_daemon.control.search import pointing
 from acu_daemon.control.searching import search
@@ -44,7 +44,6 @@ from acu_daemon.control.state import (
     Watchdog,
 )
 from acu_daemon.control.states import ACTIVE, AUTOTRACKING, HOLDING, TrackState, transition
-from acu_daemon.control.track_frame import beside
 from acu_daemon.model import Pointing
 from acu_daemon.pointing.wrap import nearest_turn
 from acu_daemon.protocol.messages import Command, Poll, WriteAndPoll
@@ -307,19 +306,7 @@ def _point(
         return None  # a mode that follows the registers must find them where the antenna is, not where it shall go
     if state.track is TrackState.SEARCH and sky.prediction is not None:
         return pointing(state.scan, sky.prediction, aim_tai_s, config) or path_point(sky, aim_tai_s)
-    return _learned_point(state, sky, aim_tai_s, is_followed=is_followed) or path_point(
-        sky, aim_tai_s, follow=is_followed
-    )
-
-
-def _learned_point(state: ControlState, sky: Sky, aim_tai_s: float, *, is_followed: bool) -> Pointing | None:
-    """The path as autotrack showed it before the first fit; None: as it is predicted."""
-    offset, prediction = state.offset, sky.prediction
-    if offset is None or prediction is None or offset.model is not prediction.model:
-        return None
-    if state.track not in (TrackState.AUTOTRACK_TLE, TrackState.HOLD_TLE):
-        return None
-    return beside(prediction, aim_tai_s, (offset.along_s, offset.across_deg), follow=is_followed)
+    return learned_point(state, sky, aim_tai_s, follow=is_followed) or path_point(sky, aim_tai_s, follow=is_followed)
 
 
 def _rest(state: ControlState, *, is_followed: bool) -> Pointing:

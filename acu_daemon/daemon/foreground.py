@@ -17,6 +17,7 @@ from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.clock_watch import ClockWatch
 from acu_daemon.daemon.lateness import Lateness
 from acu_daemon.daemon.line_watch import LineWatch
+from acu_daemon.daemon.motion import Motion
 from acu_daemon.daemon.port import AcuPort, Answer
 from acu_daemon.daemon.stopping import DEADLINE_S, stop_antenna
 from acu_daemon.edge.clock import Clock
@@ -72,6 +73,7 @@ class Foreground:
         self._status_s = -math.inf  # when the newest status came, believed or not, or was refused
         self._log: Any = structlog.get_logger("tick")
         self.identity: Identity | None = None
+        self.acu_faults = ""  # as the ACU named them last
         self.tick_count = 0
         self.write_count = 0
         self.answered_count = 0  # ordered exchanges that were answered: the work that the watchdog asks for
@@ -79,6 +81,7 @@ class Foreground:
         self.line_watch = LineWatch(port, self._doubt)
         self.clock_watch = ClockWatch(clock, config.clock_alarm_deg)
         self.lateness = Lateness()
+        self.motion = Motion()
 
     async def run(self) -> None:
         """Tick at the tenths of UTC seconds; a late tick is counted and skipped, never sent in a burst."""
@@ -226,6 +229,7 @@ class Foreground:
             is_confirmed=self._doubt.is_confirmed,
             is_in_step=answer.is_sure,
         )
+        self.motion.add(reading)
         is_locked = self._dwell.is_locked(reading)
         self._area.dwell_count = self._dwell.rejected_count
         if not answer.is_sure:
@@ -253,6 +257,7 @@ class Foreground:
             self.identity = answer.reply
             self._log.info("acu.identified", identity=str(answer.reply), is_simulation=answer.reply.is_simulated)
         elif isinstance(answer.reply, Faults):
+            self.acu_faults = ", ".join(answer.reply.texts())
             self._log.warning("acu.faults", faults=answer.reply.texts())
         elif isinstance(command, SelectMode | SelectBackup | WriteParameter | WriteRegisters) and isinstance(
             answer.reply, Ack

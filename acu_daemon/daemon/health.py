@@ -2,7 +2,9 @@
 
 from collections.abc import Callable
 
+from acu_daemon.daemon import words
 from acu_daemon.daemon.snapshot import Snapshot
+from acu_daemon.daemon.verdict import alarms, verdict
 
 FEED_S = 0.5  # between two signs of life; systemd's limit is WatchdogSec
 STATUS_S = 1.0
@@ -37,16 +39,11 @@ class Health:
 
 
 def status_line(seen: Snapshot) -> str:
-    """The line that `systemctl status` shows."""
+    """The line that `systemctl status` shows: verdict and alarms first, but for what marks a simulation."""
     marks = [mark for mark, is_on in (("REHEARSAL", seen.is_rehearsal), ("SIMULATION", seen.is_simulation)) if is_on]
-    parts = [*marks, seen.state]
-    if seen.az_deg is not None and seen.el_deg is not None:
+    parts = [*marks, verdict(seen).word, *alarms(seen), words.coming(seen), words.pointing(seen), seen.state]
+    if seen.is_link_up and seen.az_deg is not None and seen.el_deg is not None:
         parts.append(f"az {seen.az_deg:.2f} el {seen.el_deg:.2f} deg")
     if seen.fit_age_s is not None:
         parts.append(f"fit {seen.fit_age_s:.0f} s old")
-    parts += [alarm for alarm in (seen.turn_alarm, seen.limit_alarm) if alarm]
-    if seen.files_alarm:
-        parts.append(f"not written: {seen.files_alarm}")
-    if not seen.is_link_up:
-        parts.append(seen.link_problem or "no link")
-    return ", ".join(parts)
+    return ", ".join(part for part in parts if part)

@@ -1,62 +1,83 @@
-"""The live line of a terminal: state, angles, error, correction, buffer; redrawn in place five times a second."""
+"""The live line of a terminal: the verdict, alarms, the pass, where the antenna points; redrawn in place.
 
+It fits the terminal's width.  What does not fit is left out as a whole, the least first; an alarm never is, it goes on
+in further lines.  Colours only repeat what words say.
+"""
+
+import os
 import shutil
 import sys
+import textwrap
+from collections.abc import Mapping
 from typing import Protocol
 
-from acu_daemon.control.states import TrackState
+from acu_daemon.control.states import HOLDING, TrackState
+from acu_daemon.daemon import words
 from acu_daemon.daemon.snapshot import Snapshot
-from acu_daemon.model import Model
-from acu_daemon.orbit.timescales import utc_text
+from acu_daemon.daemon.verdict import Level, alarms, verdict
 
 EVERY_TICKS = 2
+VERDICT_WIDTH = 10
+GAP = "  "
+COLOURS = {Level.GOOD: "32", Level.CALM: "36", Level.WATCH: "33", Level.BAD: "1;31"}  # of ECMA-48
 
 
-def live_text(seen: Snapshot, beam_error_deg: float | None = None) -> str:
-    """One line for people; what is not known is shown as a dash.  A simulation also knows the beam error."""
-    hands = "" if seen.arming == "armed" else seen.arming.upper()
-    mark = " ".join(
-        word for word, is_on in (("SIMULATION", seen.is_simulation), ("REHEARSAL", seen.is_rehearsal)) if is_on
-    )
-    if seen.is_link_up and seen.az_deg is not None and seen.el_deg is not None:
-        antenna = f"az {seen.az_deg:7.2f} el {seen.el_deg:6.2f}"
-    else:
-        antenna = "az       - el      -"
-    if beam_error_deg is not None:
-        miss = f"beam error {beam_error_deg:5.3f} deg"
-    else:
-        miss = f"off prediction {seen.miss_deg:5.3f} deg" if seen.miss_deg is not None else "off prediction     - deg"
-    if seen.along_s is not None and seen.across_deg is not None:
-        side = "late" if seen.along_s >= 0 else "early"
-        correction = f"{abs(seen.along_s):5.2f} s {side:5} {seen.across_deg:+6.3f} deg across"
-    else:
-        correction = "no fit in force"
-    parts = [
-        f"{utc_text(seen.tai_s, 1)[11:]} {mark}".rstrip(),
-        hands,
-        f"latched: {seen.latch}" if seen.latch else "",
-        f"{seen.state:16} {antenna}",
-        f"searched {seen.search}" if seen.state == TrackState.SEARCH else "",
-        miss,
-        correction,
-        _inside(seen),
-        f"buffer {seen.buffer_s:3.0f} s {seen.buffer_kind}{' (last pass)' if seen.model == Model.LAST_PASS else ''}",
+def live_text(seen: Snapshot, beam_error_deg: float | None = None, columns: int | None = None) -> str:
+    """What people see of a snapshot: a line, more only where alarms ask for them.
+
+    columns: the width that may be used; None: all there is to say.  A simulation also knows the beam error.
+    """
+    return "\n".join(_lines(seen, beam_error_deg, columns)[1])
+
+
+def _lines(seen: Snapshot, beam_error_deg: float | None, columns: int | None) -> tuple[int, list[str]]:
+    """How many lines the head takes (verdict, alarms, marks), and all lines."""
+    head = GAP.join(part for part in (_word(seen), "; ".join(alarms(seen)), words.marks(seen)) if part)
+    lines = [head.rstrip()] if columns is None else textwrap.wrap(head, columns) or [""]
+    head_count = len(lines)
+    last = lines[-1].ljust(VERDICT_WIDTH) if head_count == 1 else lines[-1]
+    for part in _parts(seen, beam_error_deg, is_short=columns is not None):
+        if part and (columns is None or len(last) + len(GAP) + len(part) <= columns):
+            last += GAP + part
+    return head_count, [*lines[:-1], last.rstrip()]
+
+
+def _word(seen: Snapshot) -> str:
+    """The verdict, and how long the signal has been missed."""
+    said = verdict(seen).word
+    is_lost = seen.state in HOLDING and seen.state_s is not None
+    return (f"{said} {seen.state_s:.0f} s" if is_lost else said).ljust(VERDICT_WIDTH)
+
+
+def _parts(seen: Snapshot, beam_error_deg: float | None, *, is_short: bool) -> list[str]:
+    """The rest, the most wanted first."""
+    error = f"beam error {beam_error_deg:5.3f} deg" if beam_error_deg is not None else ""
+    is_blind = seen.state in HOLDING or seen.state == TrackState.SEARCH
+    return [
+        words.coming(seen, is_short=is_short),
+        words.rise(seen),
+        words.pointing(seen),
+        error,
+        words.trust(seen) if is_blind else "",
+        words.antenna(seen, 1 if is_short else 2),
+        f"{seen.utc[11:19]}Z" if seen.utc else "",
+        seen.state,
+        f"searched {seen.search}" if seen.search else "",
+        words.correction(seen),
+        words.trust(seen) if not is_blind else "",
+        words.buffer(seen),
         f"rejecting: {seen.rejecting}" if seen.rejecting else "",
-        seen.encoder_problem,
-        seen.turn_alarm,
-        seen.limit_alarm,
-        seen.clock_alarm,
-        f"not written: {seen.files_alarm}" if seen.files_alarm else "",
     ]
-    return "  ".join(part for part in parts if part).rstrip()
 
 
-def _inside(seen: Snapshot) -> str:
-    """How long the prediction stays within the half-power beam by its own sigma."""
-    if seen.inside_s is None:
-        return ""
-    sign = ">" if seen.inside_s >= seen.buffer_s - 0.2 else ""
-    return f"in beam {sign}{seen.inside_s:.0f} s"
+def has_colours(environment: Mapping[str, str]) -> bool:
+    """Whether colours are wanted: no-color.org, and a terminal that knows any."""
+    return not environment.get("NO_COLOR") and not is_dumb(environment)
+
+
+def is_dumb(environment: Mapping[str, str]) -> bool:
+    """Whether the terminal cannot draw in place."""
+    return environment.get("TERM", "") in ("dumb", "unknown")
 
 
 class Stream(Protocol):
@@ -68,24 +89,61 @@ class Stream(Protocol):
 
 
 class LiveLine:
-    """Draws the line on a terminal; the log clears it before it prints."""
+    """Draws the line on a terminal; the log clears it before it prints.
 
-    def __init__(self, stream: Stream = sys.stderr) -> None:
+    On a terminal that cannot draw in place a line is printed whenever the verdict or an alarm changes.
+    """
+
+    def __init__(self, stream: Stream = sys.stderr, environment: Mapping[str, str] = os.environ) -> None:
         self._stream = stream
-        self._is_drawn = False
+        self._has_colours = has_colours(environment)
+        self._is_dumb = is_dumb(environment)
+        self._drawn_count = 0
+        self._told: tuple[str, ...] = ()
         self._skip = 0
 
     def show(self, seen: Snapshot, beam_error_deg: float | None = None) -> None:
         self._skip = (self._skip + 1) % EVERY_TICKS
         if self._skip == 0:
-            columns = shutil.get_terminal_size().columns
-            self._stream.write("\r\033[K" + live_text(seen, beam_error_deg)[: columns - 1])
+            columns = shutil.get_terminal_size().columns - 1
+            head_count, lines = _lines(seen, beam_error_deg, columns)
+            if self._is_dumb:
+                self._print(seen, lines)
+            else:
+                self._draw(verdict(seen).level, head_count, lines)
+
+    def _print(self, seen: Snapshot, lines: list[str]) -> None:
+        told = (verdict(seen).word, *alarms(seen))
+        if told != self._told:
+            self._told = told
+            self._stream.write("\n".join(lines) + "\n")
             self._stream.flush()
-            self._is_drawn = True
+
+    def _draw(self, level: Level, head_count: int, lines: list[str]) -> None:
+        if self._has_colours:
+            lines = _coloured(level, head_count, lines)
+        self._stream.write(self._erase() + "\n".join(lines))
+        self._stream.flush()
+        self._drawn_count = len(lines)
+
+    def _erase(self) -> str:
+        return "\r\033[K" + "\033[A\033[K" * (self._drawn_count - 1)
 
     def clear(self) -> None:
         """Take the line away, so that something else can be printed."""
-        if self._is_drawn:
-            self._stream.write("\r\033[K")
+        if self._drawn_count:
+            self._stream.write(self._erase())
             self._stream.flush()
-            self._is_drawn = False
+            self._drawn_count = 0
+
+
+def _coloured(level: Level, head_count: int, lines: list[str]) -> list[str]:
+    """The verdict in its colour; further lines of alarms in the worst; OFF in the worst."""
+    first = lines[0]
+    word, rest = first[:VERDICT_WIDTH], first[VERDICT_WIDTH:].replace(" OFF ", f" {_paint('OFF', Level.BAD)} ")
+    more = [_paint(line, Level.BAD) for line in lines[1:head_count]]
+    return [_paint(word, level) + rest, *more, *lines[head_count:]]
+
+
+def _paint(text: str, level: Level) -> str:
+    return f"\033[{COLOURS[level]}m{text}\033[0m"

@@ -19,7 +19,8 @@ from acu_daemon.daemon.background import Background
 from acu_daemon.daemon.foreground import Foreground
 from acu_daemon.daemon.hands import Hands
 from acu_daemon.daemon.port import AcuPort
-from acu_daemon.daemon.snapshot import Snapshot, take_snapshot
+from acu_daemon.daemon.snapshot import Snapshot, Subject
+from acu_daemon.daemon.taking import take_snapshot
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.fit import FitRunner
 from acu_daemon.edge.link import Link
@@ -44,6 +45,8 @@ class PassJob:
     is_rehearsal: bool = False
     end_tai_s: float = math.inf  # of --duration
     state: ControlState = ControlState()  # what the decision begins with: what the last run left
+    satellite: str = ""  # names for people
+    station: str = ""
     is_anew: bool = False  # not the first run of this daemon: the ACU was there
 
 
@@ -98,6 +101,7 @@ class Service:
         self._job = job
         self._clock = clock
         self._runner = runner
+        self._acu = link.description
         self._on_snapshot = on_snapshot
         self._snapshot_ticks = snapshot_ticks
         self._on_state = on_state
@@ -284,6 +288,7 @@ class Service:
             self._port,
             self._job.control,
             self._clock.tai_s(),
+            Subject(self._job.satellite, self._job.station, self._acu, self._job.coming),
             is_rehearsal=self._job.is_rehearsal,
             files_alarm=self._files_alarm(),
         )

@@ -1,21 +1,28 @@
-"""The snapshot: everything people look at, at one instant.  Live line, status and the watchdog's food come from it."""
+"""The snapshot: everything people look at, at one instant.  Live line, status and the watchdog's food come from it.
 
-from dataclasses import dataclass, field
+daemon.taking makes it of what there is; daemon.verdict says in a word what it amounts to.
+"""
 
-from acu_daemon.control.search import covered_text
-from acu_daemon.control.state import ControlConfig, ControlState
-from acu_daemon.control.states import AUTOTRACKING, TrackState
-from acu_daemon.daemon.area import CommonArea
-from acu_daemon.daemon.foreground import Foreground
-from acu_daemon.daemon.port import AcuPort
-from acu_daemon.model import Prediction, Reading, sky_angle_deg
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
 
-LATENESS_TICKS = 100  # the newest ten seconds
+from acu_daemon.model import Pass
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """What a run is about."""
+
+    satellite: str = ""
+    station: str = ""
+    acu: str = ""
+    coming: Pass | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """Everything people look at, at one instant."""
+    """Everything people look at, at one instant.  docs/status.md tells each key."""
 
     tai_s: float
     state: str
@@ -64,91 +71,31 @@ class Snapshot:
     search: str = ""  # what SEARCH has covered so far
     rejecting: str = ""  # why the newest readings are not fitted
     rejected_counts: dict[str, int] = field(default_factory=dict)  # readings so far, by reason
+    utc: str = ""
+    satellite: str = ""
+    station: str = ""
+    acu: str = ""
+    verdict: str = ""  # daemon.verdict
+    state_s: float | None = None  # since the state began
+    off_path_deg: float | None = None  # where the antenna points beside the path (control.off_path)
+    is_on_path: bool | None = None  # by no more than half the beam
+    path: str = ""  # what that path is made from
+    half_beam_deg: float | None = None
+    speed_deg_s: float | None = None  # measured, on the sky
+    acu_mode: str = ""
+    acu_faults: str = ""  # as the ACU named them
+    is_stopping: bool = False  # a STOP was sent and is not acknowledged
+    rise_utc: str = ""
+    set_utc: str = ""
+    rise_in_s: float | None = None  # negative: the pass has begun
+    set_in_s: float | None = None
+    culmination_deg: float | None = None
 
 
-def take_snapshot(
-    area: CommonArea,
-    foreground: Foreground,
-    port: AcuPort,
-    control: ControlConfig,
-    now_tai_s: float,
-    *,
-    is_rehearsal: bool,
-    files_alarm: str,
-) -> Snapshot:
-    """What there is to see now."""
-    state, sky = area.state, area.sky
-    status, reading, prediction = state.status, state.reading, sky.prediction
-    lag_az_s, lag_el_s = state.lag_s(control)
-    identity, lateness = foreground.identity, foreground.lateness.figures(LATENESS_TICKS)
-    return Snapshot(
-        tai_s=now_tai_s,
-        state=str(state.track),
-        az_deg=status.az_deg if status else None,
-        el_deg=status.el_deg if status else None,
-        reading_age_s=now_tai_s - reading.tai_s if reading else None,
-        command_az_deg=state.axis_az.position_deg if state.axis_az else None,
-        command_el_deg=state.axis_el.position_deg if state.axis_el else None,
-        agc_db=status.agc_db if status else None,
-        search=covered_text(state.scan, prediction, control) if state.scan.rows else "",
-        is_acquired=state.track is not TrackState.LINK_LOST and reading is not None and reading.is_locked,
-        miss_deg=None if state.track is TrackState.LINK_LOST else _miss_deg(reading, prediction),
-        along_s=sky.fit.along_s if sky.fit else None,
-        across_deg=sky.fit.across_deg if sky.fit else None,
-        fit_age_s=now_tai_s - sky.fit.at_tai_s if sky.fit else None,
-        sigma_deg=_sigma_deg(prediction, now_tai_s),
-        inside_s=prediction.seconds_inside(now_tai_s, control.beamwidth_deg / 2) if prediction else None,
-        buffer_s=max(0.0, prediction.end_tai_s - now_tai_s) if prediction else 0.0,
-        buffer_kind=prediction.kind if prediction else "",
-        lag_az_s=lag_az_s,
-        lag_el_s=lag_el_s,
-        tick_count=foreground.tick_count,
-        skipped_tick_count=foreground.skipped_tick_count,
-        lateness_p50_ms=lateness.p50_ms,
-        lateness_p99_ms=lateness.p99_ms,
-        lateness_max_ms=lateness.max_ms,
-        write_count=foreground.write_count,
-        answered_count=foreground.answered_count,
-        attempt_count=port.attempt_count,
-        refusal_count=state.gate_refusal_count,
-        clamped_count=state.gate_clamped_count,
-        limit_alarm=state.limited,
-        limited_count=state.gate_limited_count,
-        turn_alarm=state.turn.alarm,
-        arming=_arming(state, control),
-        disarmed_by=state.disarmed_by,
-        latch=state.latch,
-        clock_alarm=foreground.clock_watch.alarm,
-        line_alarm=foreground.line_watch.alarm,
-        files_alarm=files_alarm,
-        encoder_problem=state.encoders.problem,
-        is_link_up=port.is_up,
-        link_problem=port.problem,
-        is_rehearsal=is_rehearsal,
-        is_simulation=identity is not None and identity.is_simulated,
-        model=str(area.model or ""),
-        rejecting=area.gate.rejecting if state.track in AUTOTRACKING else "",
-        rejected_counts=area.rejected_counts,
-    )
+def snapshot_of(values: Mapping[str, Any]) -> Snapshot:
+    """The snapshot that a daemon's JSON tells; what a newer one tells more is left out.
 
-
-def _arming(state: ControlState, control: ControlConfig) -> str:
-    if control.is_shadow:
-        return "shadow"
-    return "armed" if state.is_armed(control) else "disarmed"
-
-
-def _miss_deg(reading: Reading | None, prediction: Prediction | None) -> float | None:
-    if reading is None or not reading.is_locked or prediction is None:
-        return None
-    point = prediction.at(reading.tai_s)
-    if point is None:
-        return None
-    return sky_angle_deg(reading.az_deg, reading.el_deg, point.az_deg, point.el_deg)
-
-
-def _sigma_deg(prediction: Prediction | None, tai_s: float) -> float | None:
-    if prediction is None or prediction.sigma_deg is None:
-        return None
-    i = round((tai_s - prediction.start_tai_s) / prediction.step_s)
-    return float(prediction.sigma_deg[min(max(i, 0), prediction.sigma_deg.size - 1)])
+    Raises: TypeError: something is missing.
+    """
+    known = {one.name for one in fields(Snapshot)}
+    return Snapshot(**{name: value for name, value in values.items() if name in known})

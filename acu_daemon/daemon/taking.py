@@ -1,0 +1,145 @@
+"""Takes the snapshot: what the daemon's parts know at one instant, in the words and units of daemon.snapshot."""
+
+from dataclasses import replace
+from math import isfinite
+
+from acu_daemon.control.off_path import off_path
+from acu_daemon.control.search import covered_text
+from acu_daemon.control.state import ControlConfig, ControlState
+from acu_daemon.control.states import AUTOTRACKING, TrackState
+from acu_daemon.daemon.area import CommonArea
+from acu_daemon.daemon.foreground import Foreground
+from acu_daemon.daemon.port import AcuPort
+from acu_daemon.daemon.snapshot import Snapshot, Subject
+from acu_daemon.daemon.verdict import verdict
+from acu_daemon.model import Prediction, Reading, sky_angle_deg
+from acu_daemon.orbit.timescales import utc_text
+
+LATENESS_TICKS = 100  # the newest ten seconds
+
+
+def take_snapshot(
+    area: CommonArea,
+    foreground: Foreground,
+    port: AcuPort,
+    control: ControlConfig,
+    now_tai_s: float,
+    subject: Subject,
+    *,
+    is_rehearsal: bool,
+    files_alarm: str,
+) -> Snapshot:
+    """What there is to see now."""
+    seen = _seen(area, foreground, port, control, now_tai_s, is_rehearsal=is_rehearsal, files_alarm=files_alarm)
+    state, coming = area.state, subject.coming
+    off, late_s, half_beam_deg = off_path(state, area.sky), seen.along_s or 0.0, control.beamwidth_deg / 2
+    seen = replace(
+        seen,
+        utc=utc_text(now_tai_s, 1),
+        satellite=subject.satellite,
+        station=subject.station,
+        acu=subject.acu,
+        state_s=now_tai_s - state.entered_tai_s if isfinite(state.entered_tai_s) else None,
+        half_beam_deg=half_beam_deg,
+        off_path_deg=off.off_deg if off else None,
+        is_on_path=off.off_deg <= half_beam_deg if off else None,
+        path=off.made_from if off else "",
+        speed_deg_s=foreground.motion.speed_deg_s(now_tai_s),
+        acu_mode=state.status.mode.name if state.status else "",
+        acu_faults=foreground.acu_faults if state.track is TrackState.FAULT else "",
+        is_stopping=state.is_stop_due,
+        rise_utc=utc_text(coming.rise_tai_s, 0) if coming else "",
+        set_utc=utc_text(coming.set_tai_s + late_s, 0) if coming else "",
+        rise_in_s=coming.rise_tai_s - now_tai_s if coming else None,
+        set_in_s=coming.set_tai_s + late_s - now_tai_s if coming else None,
+        culmination_deg=coming.culmination_el_deg if coming else None,
+    )
+    return replace(seen, verdict=verdict(seen).word)
+
+
+def _seen(
+    area: CommonArea,
+    foreground: Foreground,
+    port: AcuPort,
+    control: ControlConfig,
+    now_tai_s: float,
+    *,
+    is_rehearsal: bool,
+    files_alarm: str,
+) -> Snapshot:
+    """All but what the run is about and where the antenna points."""
+    state, sky = area.state, area.sky
+    status, reading, prediction = state.status, state.reading, sky.prediction
+    lag_az_s, lag_el_s = state.lag_s(control)
+    identity, lateness = foreground.identity, foreground.lateness.figures(LATENESS_TICKS)
+    return Snapshot(
+        tai_s=now_tai_s,
+        state=str(state.track),
+        az_deg=status.az_deg if status else None,
+        el_deg=status.el_deg if status else None,
+        reading_age_s=now_tai_s - reading.tai_s if reading else None,
+        command_az_deg=state.axis_az.position_deg if state.axis_az else None,
+        command_el_deg=state.axis_el.position_deg if state.axis_el else None,
+        agc_db=status.agc_db if status else None,
+        search=covered_text(state.scan, prediction, control) if state.scan.rows else "",
+        is_acquired=state.track is not TrackState.LINK_LOST and reading is not None and reading.is_locked,
+        miss_deg=None if state.track is TrackState.LINK_LOST else _miss_deg(reading, prediction),
+        along_s=sky.fit.along_s if sky.fit else None,
+        across_deg=sky.fit.across_deg if sky.fit else None,
+        fit_age_s=now_tai_s - sky.fit.at_tai_s if sky.fit else None,
+        sigma_deg=_sigma_deg(prediction, now_tai_s),
+        inside_s=prediction.seconds_inside(now_tai_s, control.beamwidth_deg / 2) if prediction else None,
+        buffer_s=max(0.0, prediction.end_tai_s - now_tai_s) if prediction else 0.0,
+        buffer_kind=prediction.kind if prediction else "",
+        lag_az_s=lag_az_s,
+        lag_el_s=lag_el_s,
+        tick_count=foreground.tick_count,
+        skipped_tick_count=foreground.skipped_tick_count,
+        lateness_p50_ms=lateness.p50_ms,
+        lateness_p99_ms=lateness.p99_ms,
+        lateness_max_ms=lateness.max_ms,
+        write_count=foreground.write_count,
+        answered_count=foreground.answered_count,
+        attempt_count=port.attempt_count,
+        refusal_count=state.gate_refusal_count,
+        clamped_count=state.gate_clamped_count,
+        limit_alarm=state.limited,
+        limited_count=state.gate_limited_count,
+        turn_alarm=state.turn.alarm,
+        arming=_arming(state, control),
+        disarmed_by=state.disarmed_by,
+        latch=state.latch,
+        clock_alarm=foreground.clock_watch.alarm,
+        line_alarm=foreground.line_watch.alarm,
+        files_alarm=files_alarm,
+        encoder_problem=state.encoders.problem,
+        is_link_up=port.is_up,
+        link_problem=port.problem,
+        is_rehearsal=is_rehearsal,
+        is_simulation=identity is not None and identity.is_simulated,
+        model=str(area.model or ""),
+        rejecting=area.gate.rejecting if state.track in AUTOTRACKING else "",
+        rejected_counts=area.rejected_counts,
+    )
+
+
+def _arming(state: ControlState, control: ControlConfig) -> str:
+    if control.is_shadow:
+        return "shadow"
+    return "armed" if state.is_armed(control) else "disarmed"
+
+
+def _miss_deg(reading: Reading | None, prediction: Prediction | None) -> float | None:
+    if reading is None or not reading.is_locked or prediction is None:
+        return None
+    point = prediction.at(reading.tai_s)
+    if point is None:
+        return None
+    return sky_angle_deg(reading.az_deg, reading.el_deg, point.az_deg, point.el_deg)
+
+
+def _sigma_deg(prediction: Prediction | None, tai_s: float) -> float | None:
+    if prediction is None or prediction.sigma_deg is None:
+        return None
+    i = round((tai_s - prediction.start_tai_s) / prediction.step_s)
+    return float(prediction.sigma_deg[min(max(i, 0), prediction.sigma_deg.size - 1)])
