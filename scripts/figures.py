@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The figures of assisted tracking, in virtual time: every real pass, and the check of the idea of seed 001.
+"""The figures of assisted tracking, in virtual time: every real pass, and the idea of Aguirre and Medeiros 1988.
 
     .venv/bin/python scripts/figures.py                 every table (about 5 minutes on two cores)
     .venv/bin/python scripts/figures.py --only jason-1  passes whose name holds this
@@ -157,7 +157,7 @@ def register_error_deg(flight: Flight, sky: DirectionTable) -> float:
     return worst
 
 
-# The seeds' check of the idea (seed 001, 2.7)
+# The papers' check of the idea (Aguirre and Medeiros 1988, 2.7)
 
 
 def landsat_like() -> tuple[BrouwerPropagator, Site, float, float]:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The simulations of seed 001, 2.4, run again on an integrated Landsat-4-like orbit.
+"""The simulations of Aguirre and Medeiros 1988, 2.4, run again on an integrated Landsat-4-like orbit.
 
     .venv/bin/python scripts/reproduce_seed001.py               tables on standard output
     .venv/bin/python scripts/reproduce_seed001.py --plots DIR   figures 2.1 and 2.2, and the sensitivity of 2.4.3

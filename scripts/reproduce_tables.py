@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""The simulations of seeds 000 and 002 run again, many times: 18 rows x methods, beside the papers' figures.
+"""The simulations of Kuga and Carrara 1988 and 1990 run again: 18 rows x methods, beside the papers' figures.
 
     .venv/bin/python scripts/reproduce_tables.py                    100 runs, table on standard output
     .venv/bin/python scripts/reproduce_tables.py --json FILE        the same as JSON
     .venv/bin/python scripts/reproduce_tables.py --plot FILE.png    every row as a picture
-    .venv/bin/python scripts/reproduce_tables.py --figures DIR      figures 5.2-5.7 of seed 002
+    .venv/bin/python scripts/reproduce_tables.py --figures DIR      figures 5.2-5.7 of Kuga and Carrara 1988
     .venv/bin/python scripts/reproduce_tables.py --pass-8-as-printed
 
 The same seed gives the same figures, however many processes run.  It needs brahe: pip install 'acu-daemon[accuracy]'.
@@ -33,7 +33,7 @@ from tables.workers import run_script, worker_pool
 CHUNK = 5  # runs that a process does at once
 SEED = 1990
 FEWEST_RUNS = 20  # for 5 and 95 %
-FIGURE_USED_S = 210  # seed 002, figures 5.2-5.7 show a loss in the pass 2 asc. over Alcantara
+FIGURE_USED_S = 210  # Kuga and Carrara 1988, figures 5.2-5.7 show a loss in the pass 2 asc. over Alcantara
 
 
 def simulate_chunk(
@@ -83,7 +83,7 @@ def options() -> argparse.Namespace:
     parser.add_argument("--pass-8-as-printed", action="store_true", help="the printed elements for pass 8")
     parser.add_argument("--json", type=output_file, metavar="FILE", help="write the rows as JSON")
     parser.add_argument("--plot", type=output_picture, metavar="FILE", help="draw the rows (PNG)")
-    parser.add_argument("--figures", type=output_folder, metavar="DIR", help="draw figures 5.2-5.7 of seed 002 there")
+    parser.add_argument("--figures", type=output_folder, metavar="DIR", help="draw the paper's figures 5.2-5.7 there")
     chosen = parser.parse_args()
     chosen.methods = tuple(chosen.methods.split(","))
     unknown = [name for name in chosen.methods if name not in METHODS]

@@ -165,7 +165,7 @@ def test_what_is_no_ellipse_or_no_time_is_an_orbit_error() -> None:
 def test_the_passes_of_the_papers_come_out_as_printed(
     station: Station, number: int, duration_s: float, elevation_deg: float
 ) -> None:
-    # seed 000, table 1: a numerical orbit from these elements; the number counts revolutions over the ground
+    # Kuga and Carrara 1990, table 1: numerical, from these elements; the number counts revolutions over the ground
     passes = find_passes(BrouwerPropagator(SCD_1), Site(station), SCD_1.epoch_tai_s, SCD_1.epoch_tai_s + DAY_S, 5.0)
     [found] = [one for one in passes if 1 + round((one.rise_tai_s - SCD_1.epoch_tai_s) / SYNODIC_S) == number]
     assert found.duration_s == pytest.approx(duration_s, abs=5.0)

@@ -1,4 +1,4 @@
-"""assist.inversion: azimuth and elevation to node and mean anomaly, seed 000 eqs 1-16."""
+"""assist.inversion: azimuth and elevation to node and mean anomaly, Kuga and Carrara 1990 eqs 1-16."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""assist.kalman: seed 002, section 4."""
+"""assist.kalman: Kuga and Carrara 1988, section 4."""
 
 import numpy as np
 import pytest
@@ -170,7 +170,7 @@ def test_readings_that_stay_elsewhere_are_believed_after_a_while():
 
 
 def test_the_seeds_floor_keeps_the_covariance_open():
-    """Seed 002, 5.3: noise of (0.01 deg)^2 a second enters while a sigma is below 0.05 deg."""
+    """Kuga and Carrara 1988, 5.3: noise of (0.01 deg)^2 a second enters while a sigma is below 0.05 deg."""
     source, where = circular(), site(4.0)
     readings = _readings(source, where, step_s=1.0)
     seed, static = _kalman(source, where, SEED), _kalman(source, where, STATIC)

@@ -60,7 +60,7 @@ def test_a_table_of_an_orbit_has_no_answer_outside_itself() -> None:
 
 
 def test_bias_and_noise_have_the_sizes_that_the_papers_print() -> None:
-    el_deg, range_km = np.array([5.0, 15.9]), np.array([2300.0, 1500.0])  # pass 2: seed 000, table 2
+    el_deg, range_km = np.array([5.0, 15.9]), np.array([2300.0, 1500.0])  # pass 2: Kuga and Carrara 1990, table 2
     assert azimuth_model_deg(el_deg, range_km) == pytest.approx([0.06, 0.06], abs=0.005)
     assert elevation_model_deg(el_deg)[0] == pytest.approx(0.18, abs=0.005)
 
@@ -95,7 +95,7 @@ def test_the_table_of_the_reference_orbit_agrees_with_the_integrator_between_its
 
 @needs_brahe
 def test_the_second_pass_has_the_geometry_of_the_papers(second_pass: TruePass) -> None:
-    assert second_pass.duration_s == pytest.approx(450.0, abs=5.0)  # seed 000, table 1: 7:30
+    assert second_pass.duration_s == pytest.approx(450.0, abs=5.0)  # Kuga and Carrara 1990, table 1: 7:30
     assert second_pass.culmination_deg == pytest.approx(15.9, abs=0.1)
 
 

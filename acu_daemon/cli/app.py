@@ -55,7 +55,7 @@ GROUPS: dict[str, Group] = {
     ),
     "onboard": Group(
         """
-        The antenna on the satellite: tracking profiles of a steerable downlink antenna over a pass (seed 004).
+        The antenna on the satellite: tracking profiles of a steerable downlink antenna over a pass (Song et al. 2016).
 
         A pass is described in a PASS.toml (docs/onboard.md shows one).  `profile` makes its profile and writes the
         tracking-parameter file, `check` reads such a file back, `scenarios` compares the methods on made passes.

@@ -1,4 +1,4 @@
-"""The common area: the one object that foreground and background share (seed 001, 2.5)."""
+"""The common area: the one object that foreground and background share (Aguirre and Medeiros 1988, 2.5)."""
 
 from collections import deque
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""The background: fits the orbit to locked readings and keeps the prediction buffer filled (seed 001, 2.5)."""
+"""The background: fits the orbit to locked readings and keeps the buffer filled (Aguirre and Medeiros 1988, 2.5)."""
 
 import asyncio
 import math

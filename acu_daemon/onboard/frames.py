@@ -6,7 +6,7 @@ Body:    Rx(roll) Ry(pitch) Rz(yaw) LVLH.  Positive roll turns the body's +Z tow
          turns it forward.
 Gimbal:  a mount matrix times body.  Azimuth about the gimbal's +Z from +X to +Y; elevation is the angle FROM +Z, so the
          axis, where azimuth does not exist, is at elevation 0.
-Source:  seed 004, eq 1 and the text around it; docs/onboard.md has the drawings.
+Source:  Song et al. 2016, eq 1 and the text around it; docs/onboard.md has the drawings.
 """
 
 from dataclasses import dataclass

@@ -1,6 +1,6 @@
 """A pass as the antenna's gimbal sees it: for any point of the Earth, its direction at every sample.
 
-Seed 004, eq 1: the direction is the vector from satellite to ground in the Earth-fixed frame, turned to the inertial
+Song et al. 2016, eq 1: the direction is the vector from satellite to ground in the Earth-fixed frame, turned to the inertial
 frame, to LVLH and to the body; the mount turns it on to the gimbal.
 """
 

@@ -35,7 +35,7 @@ def _origin_and_axes(station: Station) -> tuple[Array, Array]:
 def look(r_itrs_m: Array, v_itrs_m_s: Array, station: Station) -> Look:
     """Turn Earth-fixed states (N, 3) into look angles and rates.
 
-    Source:  seed 000, eqs 1-3, turned to east-north-up; the rates are their time derivatives.
+    Source:  Kuga and Carrara 1990, eqs 1-3, turned to east-north-up; the rates are their time derivatives.
     """
     origin_m, axes = _origin_and_axes(station)
     east, north, up = axes @ (r_itrs_m - origin_m).T  # rows that lie whole in memory

@@ -52,7 +52,7 @@ def plot_rows(path: Path, rows: list[Row], methods: tuple[str, ...], run_count: 
 
 
 def plot_figures_5(path: Path, true_pass: TruePass, curves: Curves, used_s: int) -> None:
-    """Figures 5.2-5.7 of seed 002: eps, azimuth and elevation errors over time, for each method; writes a PNG."""
+    """Figures 5.2-5.7 of Kuga and Carrara 1988: eps, azimuth, elevation errors over time, by method; writes a PNG."""
     figure = _figure((10.5, 8.4))
     grid = figure.subplots(3, len(curves), sharex=True, sharey="row", squeeze=False)
     minutes = (true_pass.tai_s - true_pass.tai_s[0]) / 60.0

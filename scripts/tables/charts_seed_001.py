@@ -1,4 +1,4 @@
-"""Pictures of the simulations of seed 001."""
+"""Pictures of the simulations of Aguirre and Medeiros 1988."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The errors that the papers put in: noise and bias of the readings (seed 000, eqs 22-25), corrupted elements (5.3)."""
+"""The papers' errors: noise and bias of readings (Kuga and Carrara 1990, eqs 22-25), corrupted elements (section 5)."""
 
 from dataclasses import dataclass
 
@@ -54,7 +54,7 @@ def corrupted_state(errors: Errors, true_pass: TruePass) -> Array:
 
 
 def taken_as_mean(state_teme: Array, tai_s: float) -> BrouwerPropagator:
-    """Elements of a state used as if they were means, secular motion only: what the papers do (seed 002, 5.3)."""
+    """Elements of a state used as if they were means, secular motion only, as Kuga and Carrara 1988, 5.3, do."""
     return BrouwerPropagator(_elements(state_teme, tai_s), short_period=False)
 
 

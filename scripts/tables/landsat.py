@@ -1,4 +1,4 @@
-"""Passes of a Landsat-4-like orbit for seed 001, 2.4: integrated numerically, one for each highest elevation.
+"""Integrated passes of a Landsat-4-like orbit, one for each highest elevation, for Aguirre and Medeiros 1988, 2.4.
 
 The station has Cuiabá's latitude; its longitude is put where the pass gets the wanted highest elevation.
 """
@@ -20,7 +20,7 @@ from tables.reference_orbit import TabulatedOrbit, integrate_state
 from tables.seed_figures import EXACT, MIN_ELEVATION_DEG
 
 EPOCH_UTC = "1982-09-01T13:00:00Z"
-A_KM, E, I_DEG = 7077.8, 0.0002, 98.2  # means; e: seed 001, 2.3
+A_KM, E, I_DEG = 7077.8, 0.0002, 98.2  # means; e: Aguirre and Medeiros 1988, 2.3
 START_LATITUDE_ARGUMENT_DEG = 120.0  # coming from the north, 75 degrees before the pass
 SPAN_S = 2600.0
 PERIGEES_DEG = (0.0, 90.0, 180.0, 270.0)

@@ -18,7 +18,7 @@ class Method:
     source: Callable[[Array, float], Propagator]  # from a state (6,) and its time
 
 
-# Seed 002, 5.3; every reading is used, as the papers have no gate.
+# Kuga and Carrara 1988, 5.3; every reading is used, as the papers have no gate.
 _AS_PUBLISHED = EstimatorSettings(0.1, 0.1, max_fit_elevation_deg=90.0, beamwidth_deg=20.0, kalman=SEED)
 # What an operator knows: the noise, how good the elements are (5.3) and that the station is rounded.
 _TODAY_PLAIN = EstimatorSettings(

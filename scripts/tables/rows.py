@@ -66,7 +66,7 @@ def rows_of(true_pass: TruePass, eps_deg: dict[str, Array], bounds_deg: list[flo
 
 def table_text(rows: list[Row], methods: tuple[str, ...]) -> str:
     """The rows as a Markdown table, and below it how they compare."""
-    names = ("pass", "s used", "seed det.", "seed Kalman", *methods, "bound")
+    names = ("pass", "s used", "paper det.", "paper Kalman", *methods, "bound")
     lines = ["| " + " | ".join(names) + " |", "|---" * len(names) + "|"]
     for row in rows:
         cells = [

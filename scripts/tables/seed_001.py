@@ -1,4 +1,4 @@
-"""Seed 001, 2.4: losses at every elevation of a Landsat-4-like pass, and what a prediction made before is worth."""
+"""Aguirre and Medeiros 1988, 2.4: a loss at every elevation of a Landsat-4-like pass, and what prediction is worth."""
 
 from dataclasses import dataclass, replace
 
@@ -13,7 +13,7 @@ from acu_daemon.orbit.look import look_at
 from acu_daemon.units import DEG, Array
 from tables.landsat import LandsatPass
 
-LIMIT_DEG = 0.1  # seed 001, 2.4.1
+LIMIT_DEG = 0.1  # Aguirre and Medeiros 1988, 2.4.1
 OVERHEAD_DEG = 80.0
 _EVERY_READING = 90.0  # degrees: 2.6d, no fits above 80, came later
 
@@ -69,7 +69,7 @@ EXPERIMENTS = (
     replace(with_old_elements(FULL_10_S), name="full, the same, encoders good to 0.01°", settings=_TODAY_CALIBRATED),
 )
 SENSITIVE = (AS_PUBLISHED, AS_DAEMON, FULL_10_S)
-A_ERRORS_KM = (0.0, 0.05, 0.2, 1.0, 2.5, 5.0)  # seed 001, 2.4.3: 0.05 km and 0.001 deg a day, a hundred times that
+A_ERRORS_KM = (0.0, 0.05, 0.2, 1.0, 2.5, 5.0)  # Aguirre and Medeiros 1988, 2.4.3: 0.05 km a day, to 100 times that
 I_ERRORS_DEG = (0.0, 0.001, 0.01, 0.03, 0.1)
 
 

@@ -1,4 +1,4 @@
-"""What the papers print: the reference orbit, stations, passes (seed 000, tables 1 and 3) and seed 002, table 5.4."""
+"""What Kuga and Carrara print: reference orbit, stations, passes (1990, tables 1 and 3; 1988, table 5.4)."""
 
 from dataclasses import dataclass, replace
 
@@ -24,8 +24,8 @@ class SeedRow:
     """One row of the papers' tables: seconds of readings, and the largest error after them by either method."""
 
     used_s: int
-    deterministic_deg: float  # seed 000, table 3; seed 002, table 5.3
-    kalman_deg: float  # seed 002, table 5.4
+    deterministic_deg: float  # Kuga and Carrara 1990, table 3; Kuga and Carrara 1988, table 5.3
+    kalman_deg: float  # Kuga and Carrara 1988, table 5.4
 
     @property
     def better_deg(self) -> float:
