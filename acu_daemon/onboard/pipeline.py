@@ -1,4 +1,4 @@
-"""Figure 1 of Song et al. 2016, every stage: preliminary, corrected and modified profile, check, polynomials, second check.
+"""Figure 1 of Song et al. 2016, every stage: preliminary to modified profile, check, polynomials, second check.
 
 For the free path target choice, corrections for the boresight, limits and smoothing are one optimisation; for the three
 ways with a target on the ground they are steps.  In all, mounting is in the frame that is planned in.

@@ -1,7 +1,7 @@
 """A pass as the antenna's gimbal sees it: for any point of the Earth, its direction at every sample.
 
-Song et al. 2016, eq 1: the direction is the vector from satellite to ground in the Earth-fixed frame, turned to the inertial
-frame, to LVLH and to the body; the mount turns it on to the gimbal.
+Song et al. 2016, eq 1: the direction is the vector from satellite to ground in the Earth-fixed frame, turned to the
+inertial frame, to LVLH and to the body; the mount turns it on to the gimbal.
 """
 
 from dataclasses import dataclass
