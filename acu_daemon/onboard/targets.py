@@ -1,8 +1,8 @@
 """The preliminary profile by a target on the ground: the station, one of three, or the best of a search around it.
 
 Song et al. 2016: operations choose of three stations, the centre and two virtual ones east-north-east and
-west-south-west; the ground station searching method looks for the virtual station with the least largest azimuth rate.  Distances, bearings
-and the grid are ours, the copy breaks off before them: docs/onboard.md.
+west-south-west; the ground station searching method looks for the virtual station with the least largest
+azimuth rate.  Distances, bearings and the grid are ours, the copy breaks off before them: docs/onboard.md.
 """
 
 import numpy as np
