@@ -22,7 +22,7 @@ from acu_daemon.config_tables import (
     TimeSection,
     UtcTime,
 )
-from acu_daemon.model import AxisLimits, EarthOrientation, Site, Station
+from acu_daemon.model import AxisLimits, Site, Station
 from acu_daemon.onboard.attitude import Agility
 from acu_daemon.onboard.checks import Backlash
 from acu_daemon.onboard.cone import Cone
@@ -177,11 +177,8 @@ class PassFile(Section):
 
     @property
     def site(self) -> Site:
-        s, t = self.station, self.time
-        return Site(
-            Station(s.name, s.latitude_deg, s.longitude_deg, s.height_m),
-            EarthOrientation(t.ut1_utc_s, t.polar_motion_x_arcsec, t.polar_motion_y_arcsec),
-        )
+        s = self.station
+        return Site(Station(s.name, s.latitude_deg, s.longitude_deg, s.height_m), self.time.orientation)
 
     @property
     def as_satellite(self) -> SatelliteFile:

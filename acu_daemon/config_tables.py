@@ -105,6 +105,10 @@ class TimeSection(Section):
     polar_motion_x_arcsec: float = Field(default=0.0, ge=-2, le=2)
     polar_motion_y_arcsec: float = Field(default=0.0, ge=-2, le=2)
 
+    @property
+    def orientation(self) -> EarthOrientation:
+        return EarthOrientation(self.ut1_utc_s, self.polar_motion_x_arcsec, self.polar_motion_y_arcsec)
+
 
 class ReadingsSection(Section):
     sigma_azimuth_deg: Positive = 0.05
@@ -161,11 +165,8 @@ class StationFile(Section):
 
     @property
     def site(self) -> Site:
-        s, t = self.station, self.time
-        return Site(
-            Station(s.name, s.latitude_deg, s.longitude_deg, s.height_m),
-            EarthOrientation(t.ut1_utc_s, t.polar_motion_x_arcsec, t.polar_motion_y_arcsec),
-        )
+        s = self.station
+        return Site(Station(s.name, s.latitude_deg, s.longitude_deg, s.height_m), self.time.orientation)
 
 
 class SatelliteSection(Section):

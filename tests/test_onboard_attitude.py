@@ -55,6 +55,12 @@ def test_holds_that_leave_no_time_for_the_slew_are_refused_with_the_time_it_take
         plan_attitude(holds, Agility())
 
 
+def test_a_strip_may_follow_a_hold_of_the_same_angles_at_once() -> None:
+    holds = [Hold(START_TAI_S, START_TAI_S + 20.0, 5.0), Hold(START_TAI_S + 20.0, START_TAI_S + 40.0, 5.0)]
+    angles = plan_attitude(holds, Agility()).angles_deg(START_TAI_S + np.linspace(0.0, 40.0, 81))
+    assert angles[:, 0] == pytest.approx(np.full(81, 5.0))
+
+
 def test_a_hold_beyond_what_the_body_turns_is_refused() -> None:
     with pytest.raises(AttitudeError, match=r"40\.0 deg of roll"):
         plan_attitude([Hold(START_TAI_S, START_TAI_S + 5.0, 40.0)], Agility())

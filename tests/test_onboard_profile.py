@@ -14,7 +14,7 @@ from onboard_tasks import made_scenario, made_task
 
 from acu_daemon.edge.onboard import load_pass
 from acu_daemon.errors import ProfileError, UsageError
-from acu_daemon.model import AxisLimits
+from acu_daemon.model import AxisLimits, Station
 from acu_daemon.onboard.bound import least_rate
 from acu_daemon.onboard.branches import AZIMUTH_GUARD
 from acu_daemon.onboard.checks import Backlash, check_profile
@@ -22,12 +22,16 @@ from acu_daemon.onboard.cone import Cone, Tube, azimuth_tube, windings
 from acu_daemon.onboard.corrections import after_backlash, aimed, best_turn_deg, with_backlash
 from acu_daemon.onboard.frames import angles_between_deg, beam_direction, lvlh_from_inertial
 from acu_daemon.onboard.free import free_profile
+from acu_daemon.onboard.ground import footprint_east_north_m, track_east_north_m
 from acu_daemon.onboard.parameter_file import read, write
 from acu_daemon.onboard.pipeline import make
 from acu_daemon.onboard.profile import off_pointing, peak_rate_deg_s
 from acu_daemon.onboard.quintic import Knots
+from acu_daemon.onboard.recheck import check_certificate, check_peaks
 from acu_daemon.onboard.relief import least_interruption, least_margin_deg
 from acu_daemon.onboard.scenarios import DAEJEON
+from acu_daemon.orbit.frames import station_itrs_m, teme_from_itrs
+from acu_daemon.report.onboard import header
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "config" / "onboard"
 FILE_DEG = 1e-6
@@ -102,6 +106,47 @@ def test_a_rate_limit_that_cannot_be_met_says_what_it_needs_and_that_suffices(tm
     made = make(planned.task(float(found[1])), planned.station, "free", "peak", planned.file.antenna.play)
     assert made.is_met
     assert onboard("profile", path).returncode == 1
+
+
+def test_in_the_middle_of_a_target_the_body_points_at_it() -> None:
+    planned = load_pass(EXAMPLE / "pass.toml")
+    (row,) = planned.file.attitude.target
+    at = np.array([row.start_utc + row.duration_s / 2.0])
+    r_m, v_m_s = planned.propagator.states_teme(at)
+    body = planned.attitude.body_from_lvlh(at, lvlh_from_inertial(r_m, v_m_s)) @ lvlh_from_inertial(r_m, v_m_s)
+    place = station_itrs_m(Station("target", row.latitude_deg, row.longitude_deg, row.height_m))
+    to_place = teme_from_itrs(place, at, planned.file.site.orientation) - r_m
+    seen = (body @ to_place[..., None])[0, :, 0]
+    assert seen / np.linalg.norm(seen) == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
+
+
+def test_a_strip_on_another_day_is_warned_of(tmp_path: Path) -> None:
+    planned = load_pass(pass_file(tmp_path, ("2026-11-30T04:27:20Z", "2026-11-29T04:27:20Z")))
+    assert ["the strip of 2026-11-29T04:27:20Z lies outside the pass" in one for one in planned.warnings] == [True]
+
+
+@pytest.mark.parametrize("method", ["single", "three", "search", "free"])
+def test_every_method_makes_a_file_that_its_check_accepts(tmp_path: Path, method: str) -> None:
+    path, out = pass_file(tmp_path), tmp_path / "pass.tpf"
+    planned = load_pass(path)
+    task = planned.task()
+    made = make(task, planned.station, method, "peak", planned.file.antenna.play)
+    assert made.is_met
+    out.write_text(write(float(task.view.tai_s[0]), made.profile, header(planned, task, made, "peak"), made.second))
+    found = read(out.read_text(), str(out))
+    assert all(one.is_met for one in [*check_peaks(found), *check_certificate(found, task)])
+
+
+def test_a_beam_on_the_station_meets_the_ground_there_and_the_margin_around_it() -> None:
+    task = made_task(12, 2.0)
+    level = replace(DAEJEON, height_m=0.0)
+    task = replace(task, station_itrs_m=station_itrs_m(level))
+    track = track_east_north_m(task, task.station_gimbal(task.view), level)
+    assert np.abs(track).max() < 1.0
+    ranges_m = np.linalg.norm(task.view.vectors_m(task.station_itrs_m), axis=1)
+    nearest = int(np.argmin(ranges_m))
+    ring = np.linalg.norm(footprint_east_north_m(task, nearest, level), axis=1)
+    assert ring.min() == pytest.approx(float(ranges_m[nearest]) * np.tan(np.radians(2.0)), rel=0.02)
 
 
 def test_the_least_interruption_suffices_and_a_shorter_one_does_not() -> None:

@@ -86,6 +86,7 @@ def load_pass(path: Path) -> PlannedPass:
         agility = file.attitude.agility
         attitude = plan_attitude(with_nadir(holds, agility, seen.rise_tai_s, seen.set_tai_s), agility)
         imaging = tuple((hold.start_tai_s, hold.end_tai_s) for hold in holds if hold.is_imaging)
+    warnings += _elsewhere(file, seen)
     return PlannedPass(file, loaded.label, loaded.propagator, attitude, seen, imaging, warnings)
 
 
@@ -127,6 +128,17 @@ def _holds(file: PassFile, propagator: Propagator) -> list[Hold]:
         end = target.start_utc + target.duration_s
         holds.append(Hold(target.start_utc, end, roll_deg, pitch_deg, 0.0, is_imaging=True))
     return sorted(holds, key=lambda hold: hold.start_tai_s)
+
+
+def _elsewhere(file: PassFile, seen: Pass) -> list[str]:
+    """What is said of rows of the attitude that lie outside the pass: a slip of the date, most often."""
+    span = f"{utc_text(seen.rise_tai_s, 0)} to {utc_text(seen.set_tai_s, 0)}"
+    return [
+        f"attitude: the {name} of {utc_text(row.start_utc, 0)} lies outside the pass, {span}: it has no effect"
+        for name in ("hold", "strip", "target", "imaging")
+        for row in getattr(file.attitude, name)
+        if row.start_utc > seen.set_tai_s or row.start_utc + row.duration_s < seen.rise_tai_s
+    ]
 
 
 def _from_file(file: PassFile, path: Path) -> tuple[AemAttitude, list[str]]:

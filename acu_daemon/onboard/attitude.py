@@ -73,6 +73,8 @@ class AttitudePlan:
         """Roll, pitch and yaw (N, 3)."""
         angles = np.broadcast_to(np.array(self.holds[0].angles_deg), (tai_s.size, 3)).copy()
         for one, following in zip(self.holds, self.holds[1:], strict=False):
+            if following.angles_deg == one.angles_deg:
+                continue
             u = np.clip((tai_s - one.end_tai_s) / (following.start_tai_s - one.end_tai_s), 0.0, 1.0)
             share = u**3 * (10.0 + u * (6.0 * u - 15.0))
             angles += share[:, None] * (np.array(following.angles_deg) - np.array(one.angles_deg))
@@ -101,7 +103,7 @@ def plan_attitude(holds: Sequence[Hold], agility: Agility) -> AttitudePlan:
         turn_deg = max(abs(a - b) for a, b in zip(one.angles_deg, following.angles_deg, strict=True))
         needed_s = agility.slew_s(turn_deg) + agility.settle_s * (turn_deg > 0.0)
         there_s = following.start_tai_s - one.end_tai_s
-        if there_s < needed_s or there_s <= 0.0:
+        if there_s < max(needed_s, 0.0):
             raise AttitudeError(
                 f"attitude: from {utc_text(one.end_tai_s)} to {utc_text(following.start_tai_s)} are {there_s:.1f} s; "
                 f"the slew of {turn_deg:.1f} deg takes {needed_s:.1f} s with settling: move the holds apart"
