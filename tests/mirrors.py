@@ -1,0 +1,97 @@
+"""Mirrors of the whole decision: what it is given, and what it orders, seen in a mirror or turned round the vertical.
+
+Left and right are alike for an antenna, and so are up and down as long as its limits are mirrored with it: cos(el) is
+the same below the horizon.  So a tick that is given the mirrored world must order the mirrored commands.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from acu_daemon.control.state import ControlConfig, Exchange, Observation, PassPlan, Sky
+from acu_daemon.model import AxisLimits, FitResult, Prediction, Reading
+from acu_daemon.protocol.messages import Registers, Status, WriteAndPoll, WriteRegisters
+
+
+@dataclass(frozen=True)
+class Mirror:
+    """Signs of azimuth and elevation, and a turn of the azimuth, deg, that comes after."""
+
+    az: int = 1
+    el: int = 1
+    turned_deg: float = 0.0
+
+    def az_deg(self, az_deg: Any) -> Any:
+        """Continuous."""
+        return self.az * az_deg + self.turned_deg
+
+    def limits(self, limits: AxisLimits, sign: int, turned_deg: float = 0.0) -> AxisLimits:
+        ends = sorted((sign * limits.min_deg + turned_deg, sign * limits.max_deg + turned_deg))
+        return replace(limits, min_deg=ends[0], max_deg=ends[1])
+
+    def config(self, config: ControlConfig) -> ControlConfig:
+        return replace(
+            config,
+            azimuth=self.limits(config.azimuth, self.az, self.turned_deg),
+            elevation=self.limits(config.elevation, self.el),
+        )
+
+    def status(self, status: Status) -> Status:
+        ends = {"is_at_cw_limit": status.is_at_cw_limit, "is_at_ccw_limit": status.is_at_ccw_limit}
+        if self.az < 0:
+            ends = {"is_at_cw_limit": status.is_at_ccw_limit, "is_at_ccw_limit": status.is_at_cw_limit}
+            ends["is_sector_high"] = not status.is_sector_high
+        ends |= {"is_at_up_limit": status.is_at_up_limit, "is_at_down_limit": status.is_at_down_limit}
+        if self.el < 0:
+            ends |= {"is_at_up_limit": status.is_at_down_limit, "is_at_down_limit": status.is_at_up_limit}
+        return replace(status, az_deg=self.az_deg(status.az_deg) % 360.0, el_deg=self.el * status.el_deg, **ends)
+
+    def reading(self, reading: Reading) -> Reading:
+        return replace(reading, az_deg=self.az_deg(reading.az_deg) % 360.0, el_deg=self.el * reading.el_deg)
+
+    def message(self, message: Any) -> Any:
+        """A command, or a reply."""
+        if isinstance(message, WriteAndPoll | WriteRegisters):
+            return replace(message, az_deg=self.az_deg(message.az_deg), el_deg=self.el * message.el_deg)
+        if isinstance(message, Registers):
+            return replace(message, az_deg=self.az_deg(message.az_deg) % 360.0, el_deg=self.el * message.el_deg)
+        return message
+
+    def seen(self, seen: Observation) -> Observation:
+        extra = seen.extra
+        return replace(
+            seen,
+            status=None if seen.status is None else self.status(seen.status),
+            reading=None if seen.reading is None else self.reading(seen.reading),
+            extra=None if extra is None else Exchange(self.message(extra.command), self.message(extra.reply)),
+        )
+
+    def prediction(self, seen: Prediction) -> Prediction:
+        drift = seen.late_drift_deg_s
+        return replace(
+            seen,
+            az_deg=self.az_deg(seen.az_deg),
+            el_deg=self.el * seen.el_deg,
+            az_rate_deg_s=self.az * seen.az_rate_deg_s,
+            el_rate_deg_s=self.el * seen.el_rate_deg_s,
+            follow_az_deg=self.az_deg(seen.follow_az_deg),
+            follow_az_rate_deg_s=self.az * seen.follow_az_rate_deg_s,
+            late_drift_deg_s=None if drift is None else np.array([[self.az], [self.el]]) * drift,
+        )
+
+    def fit(self, fit: FitResult) -> FitResult:
+        return replace(fit, across_deg=self.az * self.el * fit.across_deg)
+
+    def plan(self, plan: PassPlan) -> PassPlan:
+        return replace(plan, start_az_deg=self.az_deg(plan.start_az_deg), start_el_deg=self.el * plan.start_el_deg)
+
+    def sky(self, sky: Sky) -> Sky:
+        return Sky(
+            None if sky.prediction is None else self.prediction(sky.prediction),
+            None if sky.fit is None else self.fit(sky.fit),
+            None if sky.plan is None else self.plan(sky.plan),
+        )
+
+
+MIRRORS = {"left and right": Mirror(az=-1), "up and down": Mirror(el=-1), "turned by 110 deg": Mirror(turned_deg=112.5)}
