@@ -116,8 +116,8 @@ DECIDES = {  # where one turn alone has the bearing, and no axis stands away fro
     "is_autotrack_selected": ALL - {"manual", "stowed", "fault"},
     "is_acquired": {"tracking"},
     "is_remote_enabled": ALL,
-    **dict.fromkeys(FAULT_FLAGS, {"fault"}),
-    **dict.fromkeys(("is_at_cw_limit", "is_at_ccw_limit"), {"tracking"}),  # an encoder there may stand
+    **{flag: {"fault"} for flag in FAULT_FLAGS},
+    **{flag: {"tracking"} for flag in ("is_at_cw_limit", "is_at_ccw_limit")},  # an encoder there may stand
 }
 
 

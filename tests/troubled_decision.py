@@ -26,9 +26,12 @@ from acu_daemon.protocol.messages import AcuMode, Nak, SelectMode, Status, Stop,
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.scenario import AcuChoice, Encoder, Scenario
+from acu_daemon.sim.sky import Direction
+from acu_daemon.units import Array
 
 PERIOD_S = 0.1
 RISE_S, PASS_S = 4.0, 400.0
+AXIS_AFTER_S = 1.0  # of a loss an axis fails
 AZIMUTHS = (
     AxisLimits(-270.0, 270.0, 20.0, 10.0),
     AxisLimits(-200.0, 320.0, 8.0, 3.0),
@@ -38,8 +41,34 @@ ELEVATIONS = (AxisLimits(0.0, 90.0, 5.0, 5.0), AxisLimits(8.0, 60.0, 4.0, 2.0))
 TROUBLES = (
     *("nothing", "loss", "loss", "long loss", "freeze az", "freeze el", "run az", "run el", "jump az", "jump el"),
     *("silence", "nak", "late", "sector", "stop", "standby", "stow", "local", "fault", "bits", "no room", "not finite"),
+    *("az code", "el code"),
 )
 FLAGS = ("is_at_cw_limit", "is_at_ccw_limit", "is_at_up_limit", "is_at_down_limit", "is_sector_high", "is_acquired")
+
+
+@dataclass
+class Swing(Star):
+    """A star that speeds up and slows down, both ways."""
+
+    az_swing_deg: float = 0.0
+    el_swing_deg: float = 0.0
+    swing_rad_s: float = 0.5
+
+    def place(self, t: Array) -> tuple[Array, Array, Array, Array]:
+        """Azimuth, continuous, elevation, and their rates at seconds."""
+        w, turned, slope = self.swing_rad_s, np.sin(self.swing_rad_s * t), np.cos(self.swing_rad_s * t)
+        return (
+            self.az_deg + self.az_rate_deg_s * t + self.az_swing_deg * turned,
+            self.el_deg + self.el_rate_deg_s * t + self.el_swing_deg * turned,
+            self.az_rate_deg_s + self.az_swing_deg * w * slope,
+            self.el_rate_deg_s + self.el_swing_deg * w * slope,
+        )
+
+    def direction(self, tai_s: float) -> Direction | None:
+        if not self.is_on:
+            return None
+        az_deg, el_deg, _, _ = self.place(np.array([tai_s - START_TAI_S]))
+        return float(az_deg[0]) % 360.0, float(el_deg[0]), 1e6
 
 
 @dataclass(frozen=True)
@@ -56,7 +85,7 @@ class Trouble:
     """One at a time."""
 
     kind: str = "nothing"
-    until_s: float = 3.0
+    until_s: float = 7.0
     sign: int = 1
     begun_s: float = 0.0
     held: Status | None = None
@@ -89,12 +118,18 @@ class TroubledDecision:
         sign_az, sign_el = draw.choice((-1, 1)), draw.choice((-1, 1))
         az_deg = draw.uniform(azimuth.min_deg + 40.0, azimuth.max_deg - 40.0)
         el_deg = draw.uniform(15.0, 80.0) if elevation.max_deg > 80.0 else draw.uniform(15.0, 55.0)
-        self.star = Star(az_deg, el_deg, sign_az * draw.uniform(0.2, 3.0), sign_el * draw.uniform(0.05, 0.5))
-        away_deg = draw.choice((0.1, 5.0, 30.0)) * draw.choice((-1, 1))
+        self.star = Swing(az_deg, el_deg, sign_az * draw.uniform(0.2, 3.0), sign_el * draw.uniform(0.05, 0.5))
+        if self.seed % 2:
+            self.star = Swing(az_deg, el_deg, 0.0, 0.0, True, sign_az * draw.uniform(5.0, 15.0), sign_el * 5.0)
+        away_deg, bit = draw.choice((0.1, 5.0, 30.0)) * draw.choice((-1, 1)), "driven"
+        if self.seed % 4 == 0 and azimuth.max_deg - azimuth.min_deg > 400.0:  # where two turns have the bearing
+            from_end_deg, is_low = draw.uniform(20.0, azimuth.max_deg - azimuth.min_deg - 380.0), sign_az > 0
+            stands_deg = azimuth.min_deg + from_end_deg if is_low else azimuth.max_deg - from_end_deg
+            away_deg, bit = stands_deg - az_deg, "stuck-1" if is_low else "stuck-0"
         antenna = AcuChoice(
             azimuth_deg=min(max(az_deg + away_deg, azimuth.min_deg), azimuth.max_deg),
             elevation_deg=el_deg,
-            sector_bit=draw.choice(("driven", "driven", "stuck-0", "stuck-1")),
+            sector_bit=bit,
         )
         scenario = Scenario(acu=antenna, encoder=Encoder(noise_deg=draw.choice((0.0, 0.003))))
         self.acu = FakeAcu(AcuParts(azimuth, elevation, 1.0, self.star, START_TAI_S, scenario, self.seed))
@@ -110,9 +145,8 @@ class TroubledDecision:
         late_s, aside_deg = (0.0, 0.0) if has_fit else (self.late_s, self.aside_deg)
         start_s = now_s - 15.0
         t = start_s + 0.5 * np.arange(80) - late_s
-        star = self.star
-        az_deg, el_deg = star.az_deg + star.az_rate_deg_s * t + aside_deg, star.el_deg + star.el_rate_deg_s * t
-        az_rate, el_rate = np.full(t.size, star.az_rate_deg_s), np.full(t.size, star.el_rate_deg_s)
+        az_deg, el_deg, az_rate, el_rate = self.star.place(t)
+        az_deg += aside_deg
         if self.trouble.kind == "not finite":
             el_deg[:] = np.nan
         prediction = Prediction(
@@ -143,9 +177,12 @@ class TroubledDecision:
             return
         was, draw = self.trouble.kind, self.random
         kind = draw.choice(TROUBLES) if was == "nothing" else "nothing"
-        lasts_s = {"nothing": 4.0, "long loss": 15.0, "loss": 4.0}.get(kind, draw.choice((0.3, 1.0, 3.5)))
+        kind = TROUBLES[self.seed % len(TROUBLES)] if self.trouble.begun_s == 0.0 else kind
+        is_of_axis = kind.endswith((" az", " el"))  # while it follows its registers, in a loss
+        lasts_s = {"nothing": 2.5, "long loss": 12.0, "loss": 4.0}.get(kind, draw.choice((0.3, 1.0, 3.5)))
+        lasts_s = 5.0 if is_of_axis else lasts_s
         self.trouble = Trouble(kind, now_s + lasts_s, draw.choice((-1, 1)), now_s)
-        self.star.is_on = "loss" not in kind
+        self.star.is_on = not (is_of_axis or "loss" in kind)
         tai_s = START_TAI_S + now_s - 0.05
         if "local" in (kind, was):
             self.acu.set_local(kind == "local", tai_s)
@@ -167,7 +204,7 @@ class TroubledDecision:
             extra = None if kind == "silence" else Exchange(self.orders.first, reply)
             return Observation(extra=extra, silence_s=self.silence_s, must_poll=kind == "silence")
         self.silence_s = 0.0
-        requests = (Request.ARM, Request.CLEAR) if self.random.random() < 0.02 else ()
+        requests = (Request.ARM, Request.CLEAR) if self.random.random() < 0.05 else ()
         if kind == "nak" or isinstance(reply, Nak):
             return Observation(extra=extra, refused=Nak(), requests=requests)
         status = self._troubled(reply, now_s)
@@ -176,12 +213,14 @@ class TroubledDecision:
         return Observation(reading, status, is_in_step=in_step, extra=extra, requests=requests, has_room=room)
 
     def _troubled(self, status: Status, now_s: float) -> Status:
-        trouble, since_s = self.trouble, now_s - self.trouble.begun_s
+        trouble, since_s = self.trouble, now_s - self.trouble.begun_s - AXIS_AFTER_S
+        if since_s < 0.0 and trouble.kind.endswith((" az", " el")):
+            return status
         trouble.held = trouble.held or status
         match trouble.kind:
-            case "freeze az":
+            case "freeze az" | "az code":
                 return replace(status, az_deg=trouble.held.az_deg)
-            case "freeze el":
+            case "freeze el" | "el code":
                 return replace(status, el_deg=trouble.held.el_deg)
             case "run az":
                 return replace(status, az_deg=_code(status.az_deg + trouble.sign * 6.0 * since_s) % 360.0)

@@ -1,7 +1,7 @@
 """Which causes of a transition are present now (control.states has the table they drive)."""
 
 from dataclasses import replace
-from math import hypot, isfinite
+from math import cos, hypot, isfinite, radians
 
 from acu_daemon.control.approach import ACQUIRE_LEAD_S, lead_s
 from acu_daemon.control.gate import within_limits
@@ -164,7 +164,7 @@ def path_point(sky: Sky, tai_s: float, *, follow: bool = True) -> Pointing | Non
 
 def _distance_deg(state: ControlState, status: Status, target: Pointing) -> float:
     """Angle on the sky between antenna and path, less what the path moved since the reading."""
-    lag_deg = 0.15 * hypot(target.az_rate_deg_s, target.el_rate_deg_s)
+    lag_deg = 0.15 * hypot(target.az_rate_deg_s * cos(radians(target.el_deg)), target.el_rate_deg_s)
     return sky_angle_deg(state.az_deg, status.el_deg, target.az_deg, target.el_deg) - lag_deg
 
 
