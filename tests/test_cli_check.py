@@ -1,21 +1,25 @@
 """`acu-daemon check`: a line per check, GO, WARN or NO-GO, against ACUs that answer, stay silent, or are not there."""
 
 import contextlib
+import json
 import os
 import socket
 import threading
 import time
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
 from command_line import Done, acu_daemon
 from config_files import BROUWER, STATION, from_file, replaced, write
+from test_live_line import SEEN
 
-from acu_daemon.cli import check
+from acu_daemon.cli import check, own_daemon
 from acu_daemon.edge.clock import SystemClock
+from acu_daemon.edge.control_socket import SOCKET
 from acu_daemon.edge.state import SNAPSHOT
+from acu_daemon.errors import AcuDaemonError
 from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.protocol.messages import (
     AcuMode,
@@ -364,3 +368,88 @@ def test_an_axis_whose_limits_do_not_hold_the_pass_is_a_warning_with_its_times(t
 
 def flat_station(text: str) -> str:
     return replaced(text, "min_deg = 0.0\nmax_deg = 90.0", "min_deg = 7.0\nmax_deg = 30.0")
+
+
+@contextlib.contextmanager
+def daemon(directory: Path, answer: str) -> Iterator[None]:
+    """Another program's control socket, which answers every line alike."""
+    directory.mkdir(exist_ok=True)
+    server = socket.socket(socket.AF_UNIX)
+    server.bind(str(directory / SOCKET))
+    server.listen()
+
+    def serve() -> None:
+        with contextlib.suppress(OSError):  # closed
+            while True:
+                client, _ = server.accept()
+                with client:
+                    client.recv(100)
+                    client.sendall(answer.encode())
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    try:
+        yield
+    finally:
+        server.shutdown(socket.SHUT_RDWR)
+        server.close()
+        thread.join()
+        (directory / SOCKET).unlink()
+
+
+@pytest.mark.parametrize("place", ["state", "state-rehearsal", "state/noaa-20"])
+@pytest.mark.parametrize(
+    ("changes", "told", "words"),
+    [
+        ({}, "GO", "TRACKING, NOAA-20 sets in 4:32, ON path 0.02 deg"),
+        ({"state": "SEARCH"}, "WARN", "SEARCHING"),
+        ({"clock_alarm": "the clock is not synchronised"}, "WARN", "the clock is not synchronised"),
+    ],
+)
+def test_in_mid_pass_it_tells_what_the_own_daemon_does_and_does_not_ask_the_acu_that_it_holds(
+    tmp_path: Path, place: str, changes: dict[str, str], told: str, words: str
+) -> None:
+    (tmp_path / "state").mkdir()
+    with acu() as small:
+        config = write(tmp_path / "config", station(small.url), scd=BROUWER)
+        seen = json.dumps(asdict(replace(SEEN, acu=small.url, **changes)))
+        with daemon(tmp_path / place, f"ok {seen}\n"):
+            done = acu_daemon("check", "--config", config, "--state", tmp_path / "state")
+        assert small.asked == []
+    verdict, said = lines(done)["running daemon"]
+    assert (verdict, done.code) == (told, 0)
+    assert "a daemon runs and holds the ACU" in said
+    assert words in said
+    assert "stop it" not in done.out
+
+
+def test_a_daemon_of_another_acu_or_one_that_was_killed_says_nothing_of_this_one(tmp_path: Path) -> None:
+    state = tmp_path / "state"
+    with acu() as small:
+        config = write(tmp_path / "config", station(small.url), scd=BROUWER)
+        asked = ("check", "--config", config, "--state", state)
+        with daemon(state, f"ok {json.dumps(asdict(replace(SEEN, acu='tcp://other:1')))}\n"):
+            assert lines(acu_daemon(*asked))["ACU"][0] == "GO"
+        with socket.socket(socket.AF_UNIX) as dead:
+            dead.bind(str(state / SOCKET))
+        found = lines(acu_daemon(*asked))
+    assert found["ACU"][0] == "GO"
+    assert "running daemon" not in found
+
+
+def test_a_daemon_that_may_not_be_asked_is_named_and_the_acu_that_it_holds_is_no_no_go(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(directory: Path, _: str) -> str:
+        raise AcuDaemonError(f"{directory / SOCKET}: not permitted; be root (sudo), its user or in its group")
+
+    async def held(_: object) -> list[check.Finding]:
+        return [check.Finding(check.NO_GO, "ACU", "tcp://acu:1 was closed at once: another client holds the ACU")]
+
+    monkeypatch.setattr(own_daemon, "ask", refuse)
+    monkeypatch.setattr(check, "_acu", held)
+    config = write(tmp_path / "config", STATION, scd=BROUWER)
+    done = acu_daemon("check", "--config", config, "--state", tmp_path / "state")
+    found = lines(done)
+    assert (found["running daemon"][0], found["ACU"][0], done.code) == ("WARN", "WARN", 0)
+    assert "be root (sudo)" in found["running daemon"][1]

@@ -5,7 +5,7 @@ import json
 import os
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -24,10 +24,13 @@ from acu_daemon.cli.options import (
     open_ends,
     parse_utc,
 )
+from acu_daemon.cli.own_daemon import OwnDaemon, find_daemon
 from acu_daemon.config import load_station, satellite_names
 from acu_daemon.config_tables import AcuSection
 from acu_daemon.control.plan import plan_pass
+from acu_daemon.daemon.health import status_line
 from acu_daemon.daemon.port import AcuPort
+from acu_daemon.daemon.verdict import Level, alarms, verdict
 from acu_daemon.edge.clock import SystemClock, is_clock_synchronised, system_tai_s
 from acu_daemon.edge.clock_sense import before_elements, before_release
 from acu_daemon.edge.latch import ADVICE, DISARMED, LATCH
@@ -77,7 +80,8 @@ def command(
 ) -> None:
     """Check everything a pass needs: files, clock, elements, next pass, cable wrap, axes, link, ACU.  Moves nothing.
 
-    A line per check, GO, WARN or NO-GO; exit status 1 if any is NO-GO.
+    A line per check, GO, WARN or NO-GO; exit status 1 if any is NO-GO.  While a daemon runs it holds the ACU: then what
+    it sees is shown in place of what the ACU would be asked.
     """
     now_tai_s = SystemClock().tai_s() if at is None else parse_utc("--at", at)
     worst = GO
@@ -114,7 +118,23 @@ def _findings(config: Path, satellite: str | None, now_tai_s: float, state: Path
     except UsageError as error:
         yield Finding(NO_GO, "line rate", str(error))
         return
-    yield from run_loop(_acu, station.acu)
+    if (daemon := find_daemon(link.description, state)) is not None:
+        yield _held(daemon)
+        if daemon.seen is not None:
+            return
+    for finding in run_loop(_acu, station.acu):
+        is_ours = daemon is not None and finding.verdict == NO_GO and "another client holds" in finding.detail
+        yield replace(finding, verdict=WARN) if is_ours else finding
+
+
+def _held(daemon: OwnDaemon) -> Finding:
+    """A daemon that tracks has the ACU for itself: what it sees of it stands for what would be asked."""
+    if daemon.seen is None:
+        return Finding(WARN, "running daemon", f"one runs with {daemon.directory}: {daemon.problem}")
+    seen = daemon.seen
+    is_well = verdict(seen).level < Level.WATCH and not alarms(seen)
+    about = f"a daemon runs and holds the ACU, which is not asked: {status_line(seen)}; {verdict(seen).why}"
+    return Finding(GO if is_well else WARN, "running daemon", f"{about} ({daemon.directory})")
 
 
 def place_text(site: Site, now_tai_s: float) -> str:
@@ -133,9 +153,9 @@ def place_text(site: Site, now_tai_s: float) -> str:
 
 def _left_behind(directory: Path) -> Iterator[Finding]:
     """What of the last run forbids the next one to move."""
-    for verdict, name in ((NO_GO, LATCH), (WARN, DISARMED)):
+    for grade, name in ((NO_GO, LATCH), (WARN, DISARMED)):
         if os.access(directory / name, os.F_OK):  # one that is not ours to look into says nothing
-            yield Finding(verdict, name, f"{directory / name} is there: {ADVICE[name]}")
+            yield Finding(grade, name, f"{directory / name} is there: {ADVICE[name]}")
 
 
 def _running(state: Path | None) -> Finding:
@@ -155,7 +175,7 @@ def _alarms(snapshot: Path) -> list[str]:
     try:
         seen = json.loads(snapshot.read_text(encoding="utf-8"))
         latch, disarmed_by = seen.get("latch", ""), seen.get("disarmed_by", "")
-        names = ("clock_alarm", "encoder_problem", "files_alarm", "turn_alarm", "limit_alarm")
+        names = ("clock_alarm", "encoder_problem", "files_alarm", "turn_alarm", "limit_alarm", "line_alarm")
         others = [seen.get(name, "") for name in names]
     except (OSError, ValueError, AttributeError):
         return []
