@@ -10,9 +10,9 @@ the ray at the distance d from the antenna has the geometric elevation
 
     g = E + arcsin(b / d)
 
-which is exact above the air, whatever the satellite's height; at 600 km it is 0.006 deg above that of a source at
-infinity, at 5 deg of elevation.  So only tau(e) is integrated and tabulated, at the start, and both ways agree: apparent
-to geometric is this formula, geometric to apparent its solution by Newton.
+which is exact above the air, whatever the satellite's height; at 600 km and 5 deg of elevation the refraction is 0.006
+deg less than that of a source at infinity.  So only tau(e) is integrated and tabulated, at the start, and both ways
+agree: apparent to geometric is this formula, geometric to apparent its solution by Newton.
 
 tau = -integral of dn/dr cot(elevation) / n dr.  With q = n r sin(elevation), d(n r) / q = dq / (n r), and the integrand
 is smooth from the antenna (also where the ray first descends) to the top of the air.
