@@ -1,13 +1,13 @@
 """`acu-daemon groundtrack from-elements`: D and the manoeuvres of a real satellite, from a history of element sets."""
 
 import json
-import os
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
 
+from acu_daemon.cli.outputs import refuse_unwritable
 from acu_daemon.errors import OrbitError, UsageError
 from acu_daemon.groundtrack.history import History, crossing_near, history_of, mean_orbit_of
 from acu_daemon.groundtrack.kinks import FoundManoeuvre, find_manoeuvres
@@ -81,19 +81,6 @@ def parsed_cycle(text: str | None) -> Cycle | None:
     if not (revolutions.isdecimal() and days.isdecimal() and int(days) > 0 and int(revolutions) > 0):
         raise UsageError(f"--cycle {text}: expected REVOLUTIONS/DAYS such as 373/26")
     return Cycle(int(revolutions), int(days))
-
-
-def refuse_unwritable(*paths: Path | None) -> None:
-    """UsageError: a file cannot be made there; said before the work, not after it."""
-    for path in paths:
-        if path is None:
-            continue
-        if not path.absolute().parent.is_dir():
-            raise UsageError(f"{path}: there is no directory {path.parent}; make it first")
-        if path.is_dir() or not os.access(path if path.exists() else path.absolute().parent, os.W_OK):
-            raise UsageError(
-                f"{path} cannot be written: {'it is a directory' if path.is_dir() else 'permission denied'}"
-            )
 
 
 def write_csv(path: Path, header: str, rows: list[str]) -> None:

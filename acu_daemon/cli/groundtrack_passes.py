@@ -10,8 +10,9 @@ import numpy as np
 import typer
 
 from acu_daemon.assist.gate import Dwell
-from acu_daemon.cli.groundtrack_elements import AsJson, Csv, CycleText, Plot, parsed_cycle, refuse_unwritable, write_csv
+from acu_daemon.cli.groundtrack_elements import AsJson, Csv, CycleText, Plot, parsed_cycle, write_csv
 from acu_daemon.cli.options import Config, Satellite, load_target
+from acu_daemon.cli.outputs import refuse_unwritable
 from acu_daemon.config import estimator_settings
 from acu_daemon.control.ground_track import SeenPass, seen_pass
 from acu_daemon.control.refit import RefitSetup

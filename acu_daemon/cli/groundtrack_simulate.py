@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from acu_daemon.cli.groundtrack_elements import refuse_unwritable
+from acu_daemon.cli.outputs import refuse_unwritable
 
 TRUE_DEGREE, KNOWN_DEGREE = 20, 12  # of the tesserals: what pulls, and what the table on board has
 

@@ -1,13 +1,13 @@
 """`acu-daemon onboard`: tracking profiles of a satellite's own steerable antenna."""
 
 import json
-import os
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from acu_daemon.cli.outputs import refuse_unwritable, write_ascii
 from acu_daemon.edge.campaign import progress_bar, results_of, run_campaign
 from acu_daemon.edge.onboard import PlannedPass, load_pass
 from acu_daemon.edge.onboard_scenarios import Run, run_scenario
@@ -54,9 +54,7 @@ def profile(
 
     Exit status 1: no profile keeps to margin, ranges and limits; the message says what would.
     """
-    for path in (out, plot):
-        if path is not None:
-            _refuse_unwritable(path)
+    refuse_unwritable(out, plot)
     planned = load_pass(pass_file)
     for warning in planned.warnings:
         typer.echo(f"warning: {warning}", err=True)
@@ -77,7 +75,7 @@ def profile(
         )
     if out is not None:
         about = {"PASS": pass_file.name, **header(planned, task, made, wanted.objective)}
-        _write(out, write(float(task.view.tai_s[0]), made.profile, about, made.second))
+        write_ascii(out, write(float(task.view.tai_s[0]), made.profile, about, made.second))
         typer.echo(f"written to {out}")
 
 
@@ -124,8 +122,7 @@ def scenarios(
 
     The same seed makes the same scenario, whatever the count and the processes: `--count 1 --seed 17` runs one again.
     """
-    if json_file is not None:
-        _refuse_unwritable(json_file)
+    refuse_unwritable(json_file)
     if not 0.0 < margin_deg <= _WIDEST_MARGIN_DEG:
         raise UsageError(f"--margin-deg {margin_deg:g}: expected more than 0 and at most {_WIDEST_MARGIN_DEG:g}")
     runs = [Run(seed + k, margin_deg, imaging) for k in range(count)]
@@ -134,7 +131,7 @@ def scenarios(
     typer.echo("\n".join(scenario_table(rows, margin_deg)))
     if json_file is not None:
         kept = [{key: value for key, value in asdict(row).items() if value is not None} for row in rows]
-        _write(json_file, json.dumps({"margin_deg": margin_deg, "rows": kept}, indent=1) + "\n")
+        write_ascii(json_file, json.dumps({"margin_deg": margin_deg, "rows": kept}, indent=1) + "\n")
 
 
 def _chosen(planned: PlannedPass, method: str | None, objective: str | None) -> PlannedPass:
@@ -183,19 +180,3 @@ def _with_pass(found: ParameterFile, path: Path) -> list[Check]:
     task = planned.task(margin_deg, (found.start_tai_s, found.start_tai_s + found.end_s))
     checks = check_profile(task, found.profile, planned.file.antenna.play)
     return [*checks, *check_peaks(found), *check_certificate(found, task)]
-
-
-def _refuse_unwritable(path: Path) -> None:
-    if path.is_dir():
-        raise UsageError(f"{path} is a directory; give a file's name")
-    if not path.parent.is_dir():
-        raise UsageError(f"{path}: there is no directory {path.parent}; make it first")
-    if not os.access(path if path.exists() else path.parent, os.W_OK):
-        raise UsageError(f"{path} cannot be written: permission denied")
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="ascii", errors="replace")
-    except OSError as error:
-        raise UsageError(f"{path}: {error.strerror}") from None

@@ -1,6 +1,5 @@
 """`acu-daemon replay`: recorded readings through the daemon's own fit and prediction."""
 
-import os
 import sys
 import time
 from collections.abc import Callable
@@ -12,6 +11,7 @@ import typer
 
 from acu_daemon.assist.estimator import ESTIMATORS
 from acu_daemon.cli.options import SPARE_S, Config, Satellite, Target, lacking, load_target
+from acu_daemon.cli.outputs import refuse_unwritable
 from acu_daemon.config import estimator_settings
 from acu_daemon.control.comparison import compare, what_is_left_out
 from acu_daemon.control.refit import RefitSetup
@@ -62,9 +62,9 @@ def command(
     """
     names: list[str | None] = [*ESTIMATORS] if estimator == ALL else [estimator]
     paths = {name: _beside(out, name) if estimator == ALL else out for name in names}
+    refuse_unwritable(*paths.values())
     for path in paths.values():
         try:
-            _refuse_unwritable(path)
             is_same = path.exists() and readings.exists() and path.samefile(readings)
         except OSError as error:
             raise UsageError(f"{error.filename}: {error.strerror}") from None
@@ -91,16 +91,6 @@ def command(
         return
     (only,) = results.values()
     typer.echo(f"readings left out of the fit: {what_is_left_out(only[-1].left_out)}", err=True)
-
-
-def _refuse_unwritable(path: Path) -> None:
-    """UsageError: a replay of minutes would end without its file."""
-    if path.is_dir():
-        raise UsageError(f"--out {path} is a directory; give a file's name")
-    if not path.parent.is_dir():
-        raise UsageError(f"--out {path}: there is no directory {path.parent}; make it first")
-    if not os.access(path if path.exists() else path.parent, os.W_OK):
-        raise UsageError(f"--out {path} cannot be written: permission denied")
 
 
 def _beside(out: Path, name: str | None) -> Path:
