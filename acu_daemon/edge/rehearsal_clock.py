@@ -3,8 +3,8 @@
 Whoever starts first has the clock: `--at` holds at the start of that process.  The other one finds it there, and takes
 it where its own --at says the same; so either may be stopped and started again in mid-rehearsal.  The file, in the
 user's runtime directory, is locked as long as its process lives: what a dead one left counts for nothing.  A line with
-faults between the two (`fault-proxy`) leaves the place it leads to instead.  The wire carries no clock (ICD section 6),
-so a simulator of another hand has none to give.
+faults between the two (`fault-proxy`) leaves the place it leads to instead.  The wire carries no clock
+(docs/protocol.md, Time tags), so a simulator of another hand has none to give.
 """
 
 import contextlib
