@@ -12,6 +12,7 @@ from acu_daemon.assist.estimator import make_estimator
 from acu_daemon.assist.full import FullEstimator
 from acu_daemon.assist.full_states import make_prior
 from acu_daemon.assist.settings import BROUWER_SIGMAS, OEM_SIGMAS, ElementSigmas, EstimatorSettings, StateSigmas
+from acu_daemon.assist.why_far import why_far
 from acu_daemon.assist.widening import WIDTHS
 from acu_daemon.control.refit import RefitRequest, RefitSetup, Refitter
 from acu_daemon.model import AngleBias, AxisLimits, Correction, FitResult, Readings
@@ -128,3 +129,53 @@ def test_mean_motion_and_e_vector_of_brouwer_elements_are_worth_less_by_the_day(
     assert sigmas[2][4] == pytest.approx(np.hypot(2e-4, 6e-4))
     assert sigmas[2][2] == pytest.approx(4e-5 / 60.0, rel=0.02)
     assert sigmas[2][0] == sigmas[0][0]
+
+
+# What it says of the cause
+
+
+def note_of(truth: Any, *, clock_s: float = 0.0, bias: AngleBias | None = None, count: int = 60) -> str:
+    """The last note of a fit to a pass; clock_s: how fast the station's clock is."""
+    bias = bias or AngleBias()
+    tai_s = visible(truth, WHERE, 1.0)
+    seen = look_at(truth, tai_s - clock_s, WHERE)
+    az_deg, el_deg = seen.az_deg + bias.az_deg, seen.el_deg + bias.el_deg
+    readings = noisy(az_deg, el_deg, tai_s, SIGMA_DEG, np.random.default_rng(1))
+    estimator = make_estimator("full", SOURCE, WHERE, GIVEN)
+    for k in range(0, count, 20):
+        estimator.add(readings.part(slice(k, k + 20)))
+        estimator.fit()
+    return estimator.notes[-1]
+
+
+@pytest.mark.parametrize("seconds", [14.0, -14.0, 7.0])
+def test_a_clock_and_elements_that_are_late_alike_are_both_named_and_none_is_blamed(seconds: float) -> None:
+    """A rehearsal's clock 14 s off was told as elements to be fetched anew."""
+    late = SOURCE.corrected(Correction(delta_mean_anomaly_rad=-seconds * 7.4 / 7180.0))
+    for note in (note_of(SOURCE, clock_s=seconds), note_of(late)):
+        side, clock = ("late", "fast") if seconds > 0 else ("early", "slow")
+        said = float(note.split("allow: ")[1].split(" s ")[0])
+        assert said == pytest.approx(abs(seconds), abs=1.5)
+        assert f" s {side}, " in note
+        assert f"like a clock that is {said:.1f} s {clock}" in note
+        assert "elements (0.0 days" in note
+        assert "look at both" in note
+        assert "fetch" not in note
+
+
+def test_what_lies_beside_the_track_is_no_matter_of_the_clock() -> None:
+    for note in (
+        note_of(SOURCE.corrected(Correction(delta_raan_rad=0.01))),
+        note_of(SOURCE, bias=AngleBias(az_deg=1.0)),
+    ):
+        assert "km of it lie beside the track" in note
+        assert "another object" in note
+        assert "a station whose place is wrong" in note
+        assert "encoders that read beside" in note
+        assert "clock" not in note
+
+
+def test_an_encoder_that_reads_farther_beside_than_expected_is_named() -> None:
+    text = why_far(SOURCE, GIVEN, Correction(), AngleBias(az_deg=0.31), (0.0, 0.0), SOURCE.epoch_tai_s)
+    assert "the azimuth encoder seems to read +0.31 deg beside (bias_sigma_azimuth_deg = 0.1)" in text
+    assert "elevation encoder" not in text

@@ -11,6 +11,7 @@ from acu_daemon.assist.full_solve import Problem, Solution, solve
 from acu_daemon.assist.full_states import Prior, bias_of, correction_of, make_prior, shift_of
 from acu_daemon.assist.innovation import DENIED_S, WIDEST_SIGMAS, Denial
 from acu_daemon.assist.settings import EstimatorSettings
+from acu_daemon.assist.why_far import why_far
 from acu_daemon.assist.widening import WIDTHS, is_strained, most_likely
 from acu_daemon.model import Correction, FitResult, Readings, Site
 from acu_daemon.orbit.frames import station_itrs_m, teme_from_itrs
@@ -110,11 +111,13 @@ class FullEstimator(BaseEstimator):
         solution, width = most_likely(problem, self._width, seen, solution)
         if width > self._width:
             self._width = width
-            self.notes.append(
-                "the satellite is farther from its elements than their sigmas allow, which are widened for this pass; "
-                "fetch newer elements, or say in [uncertainty] what they are worth"
-            )
+            self.notes.append(self._why_far(solution, float(seen.tai_s[-1])))
         return solution
+
+    def _why_far(self, solution: Solution, at_tai_s: float) -> str:
+        correction, bias = correction_of(solution.x), bias_of(solution.x)
+        shift = shift_for_people(self._source, correction, at_tai_s, self._site)
+        return why_far(self._source, self._settings, correction, bias, shift, at_tai_s)
 
     def _result(self, solution: Solution, at_tai_s: float) -> FitResult:
         left_out = int(np.count_nonzero(solution.left.weights == 0.0))
