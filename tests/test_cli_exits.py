@@ -1,5 +1,11 @@
 """What commands share: exit status of every kind of failure, help, version, and the clock that --at asks for."""
 
+import os
+import shlex
+import shutil
+import socket
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -13,6 +19,7 @@ from acu_daemon.cli.options import coming_pass, load_target, make_clock, parse_u
 from acu_daemon.errors import ConfigError, ElementsError, LinkError, NoAcuError, OrbitError, UsageError
 from acu_daemon.orbit.timescales import tai_from_utc
 
+ROOT = Path(__file__).resolve().parents[1]
 COMMANDS = ("run", "fake-acu", "demo", "passes", "check", "replay", "arm", "disarm", "clear", "status")
 
 
@@ -76,10 +83,53 @@ def test_a_group_runs_its_command_with_only_that_module_loaded(monkeypatch: pyte
     assert "sky" in acu_daemon("--help").out
 
 
-def test_the_help_tells_the_first_steps_and_the_exit_statuses() -> None:
+def first_steps() -> list[list[str]]:
+    """The commands that the help prints, as they stand there."""
     text = acu_daemon("-h").out
-    assert "First steps:" in text
-    assert "Exit status:" in text
+    lines = text.split("First steps")[1].split("`acu-daemon status")[0].splitlines()
+    return [shlex.split(line.rstrip(" &")) for line in lines if line.strip().startswith("acu-daemon ")]
+
+
+def test_the_help_tells_the_first_steps_and_the_exit_statuses() -> None:
+    assert [step[1] for step in first_steps()] == ["demo", "passes", "fake-acu", "check", "run"]
+    assert "Exit status:" in acu_daemon("-h").out
+
+
+def test_the_first_steps_work_as_printed_with_the_configuration_that_is_shipped(tmp_path: Path) -> None:
+    """But for the port, which others may use, and the end of the run; they said that elements of 1989 are too old."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    shutil.copytree(ROOT / "config", tmp_path / "config")
+    station = tmp_path / "config" / "station.toml"
+    station.write_text(replaced(station.read_text(), "127.0.0.1:3842", f"127.0.0.1:{port}"))
+    _, passes_step, simulator, check_step, run_step = first_steps()
+    environment = os.environ | {"XDG_STATE_HOME": str(tmp_path / "state")}
+
+    def started(step: list[str], *more: str) -> subprocess.Popen[str]:
+        command = [sys.executable, "-m", "acu_daemon", *step[1:], *more]
+        pipe = subprocess.PIPE
+        return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, cwd=tmp_path, env=environment)
+
+    def done(step: list[str], *more: str) -> tuple[int, str, str]:
+        with started(step, *more) as process:
+            out, errors = process.communicate()
+        return process.returncode, out, errors
+
+    code, table, errors = done(passes_step)
+    assert (code, errors) == (0, "")
+    assert "1989-02-01 01:58:45" in table
+    with started(simulator) as fake:
+        try:
+            assert fake.stdout is not None
+            assert any("listening" in line for line in fake.stdout)
+            code, checked, _ = done(check_step)
+            assert code == 0, checked
+            assert "SIMULATION" in checked
+            _, log, errors = done(run_step, "--duration", "2.5")
+            assert '"acu.identified"' in log, errors
+            assert '"reason": "duration over"' in log
+        finally:
+            fake.terminate()
 
 
 def test_the_version_is_shown() -> None:

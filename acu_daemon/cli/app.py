@@ -74,8 +74,17 @@ HELP = """
     keeps the ACU's remote command registers on the satellite ten times a second.  When the signal is lost the antenna
     follows the prediction, and is still on the satellite when the signal comes back.
 
-    First steps:  acu-daemon demo;  acu-daemon passes --config config;
-    acu-daemon check --config config;  acu-daemon run --config config --satellite NAME.
+    First steps, in a clone of the project (its satellite is one of 1989, so they are rehearsed there and then):
+
+    \b
+      acu-daemon demo
+      acu-daemon passes --config config --from 1989-02-01T00:00:00Z
+      acu-daemon fake-acu --config config --satellite scd-1 --at 1989-02-01T01:58:30Z &
+      acu-daemon check --config config --at 1989-02-01T01:58:30Z
+      acu-daemon run --config config --satellite scd-1 --at 1989-02-01T01:58:30Z
+
+    `acu-daemon status --rehearsal` in another terminal tells what it does; Ctrl-C stops it safely.  Then your own
+    station: its numbers in a station.toml, a TOML file for each satellite (README.md), and the same without --at.
 
     Exit status: 0 done, 1 the check or the pass failed, 2 wrong use or configuration, 3 no ACU within 10 s, 4 internal
     error.
