@@ -322,6 +322,20 @@ def test_scenarios_are_the_same_whatever_the_count_and_written_as_rows(tmp_path:
     assert written["rows"][1]["culmination_deg"] == pytest.approx(made_scenario(7).seen.culmination_el_deg)
 
 
+def test_a_boresight_turned_away_from_the_axis_reaches_further_out() -> None:
+    task = made_task(0, 1.0)
+    top = float(task.station_gimbal(task.view).el_deg.max())
+    short = AxisLimits(0.0, top - 1.5, np.inf, np.inf)
+    for offset_deg, is_in_reach in ((0.0, False), (1.0, True), (-1.0, False)):
+        cone = Cone(1.0, boresight_elevation_deg=offset_deg, el_max_deg=short.max_deg)
+        turned = replace(task, cone=cone, elevation=short)
+        if is_in_reach:
+            assert make(turned, DAEJEON, "free").is_met
+        else:
+            with pytest.raises(ProfileError, match="beyond the elevation range"):
+                make(turned, DAEJEON, "free")
+
+
 def test_backlash_that_takes_all_of_the_margin_is_refused() -> None:
     with pytest.raises(ProfileError, match="widen margin_deg"):
         make(made_task(0, 0.1), DAEJEON, "free", "peak", Backlash(0.2, 0.2))

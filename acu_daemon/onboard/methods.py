@@ -15,7 +15,7 @@ def make_profile(task: Task, station: Station, method: Method, objective: Object
         return free_profile(task, objective)
     if method == "single":
         return pointed_profile(task, task.station_itrs_m, method)
-    three = three_stations(station, task.margin_deg)
+    three = three_stations(task.view, station, task.margin_deg)
     of_three = pointed_profile(task, three[int(np.argmin(peak_rates_deg_s(task.view, three)))], method)
     if method == "three":
         return of_three

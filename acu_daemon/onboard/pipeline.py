@@ -81,7 +81,7 @@ def _led(task: Task, profile: Profile, backlash: Backlash) -> Profile:
 
 def refuse_out_of_reach(task: Task) -> None:
     """ProfileError: the station is beyond elevation's range by more than the margin for a part of the pass."""
-    el_deg = task.station_gimbal(task.view).el_deg + task.cone.boresight_elevation_deg
+    el_deg = task.station_gimbal(task.view).el_deg - task.cone.boresight_elevation_deg  # the motor's
     is_out = el_deg > task.elevation.max_deg + task.margin_deg
     if is_out.any():
         times = task.view.tai_s[is_out]

@@ -14,6 +14,8 @@ from acu_daemon.units import DEG, Array
 FIRST_PIECE_S, SHORTEST_PIECE_S = 20.0, 0.3
 FOLLOWS_DEG = 0.005  # on the sky
 _MILLISECONDS = 3  # decimals of a piece's start: a time that a file can give exactly
+_FOLLOWS_SHARE = 0.01  # of the margin, where that is less
+_RIPPLE_DEG = 2.0 * FOLLOWS_DEG  # of the polynomials, at the ends of elevation's range
 _SPARSE_PIECE_S = 4.0  # longer pieces are fitted at a quarter of a second
 
 
@@ -27,9 +29,9 @@ def pointed_profile(task: Task, target_itrs_m: Array, method: Method) -> Profile
     aim = aimed(task.view.vectors_m(target_itrs_m), task.cone)
     wanted = Gimbal(
         aim.az_deg + best_turn_deg(aim.az_deg, task.azimuth),
-        np.clip(aim.el_deg, task.elevation.min_deg, task.elevation.max_deg),
+        np.clip(aim.el_deg, task.elevation.min_deg + _RIPPLE_DEG, task.elevation.max_deg - _RIPPLE_DEG),
     )
-    azimuth, elevation = fit(time_s, wanted)
+    azimuth, elevation = fit(time_s, wanted, follows_deg=min(FOLLOWS_DEG, _FOLLOWS_SHARE * task.margin_deg))
     return Profile(
         method,
         _slowed(azimuth, time_s, wanted.az_deg, task.azimuth),

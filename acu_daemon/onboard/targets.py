@@ -14,6 +14,7 @@ from acu_daemon.units import DEG, Array
 
 THREE_BEARINGS_DEG = np.array([67.5, 247.5])
 THREE_RANGE_M = 670e3  # times the tangent of the margin: its footprint from overhead
+_RANGE_SHARE = 0.977  # 670 km over KOMPSAT-3's least range
 SEARCH_BEARINGS = 24
 SEARCH_RINGS = 5
 GUARD_DEG = 0.05  # of the margin; without it 9 of 66 profiles leave the margin after the fit
@@ -22,9 +23,10 @@ _COARSE = 4  # plan samples: 1 s; off-pointing is smooth
 _FINE_SPAN_S = 3.0
 
 
-def three_stations(station: Station, margin_deg: float) -> Array:
-    """The centre and the two virtual stations, (3, 3), ITRS."""
-    distance = np.full(2, THREE_RANGE_M * np.tan(margin_deg * DEG))
+def three_stations(view: PassView, station: Station, margin_deg: float) -> Array:
+    """The centre and the two virtual stations, (3, 3), ITRS; nearer where the satellite comes nearer than KOMPSAT-3."""
+    nearest_m = float(np.linalg.norm(station_itrs_m(station) - view.plan.satellite_itrs_m, axis=1).min())
+    distance = np.full(2, min(THREE_RANGE_M, _RANGE_SHARE * nearest_m) * np.tan(margin_deg * DEG))
     return np.vstack([station_itrs_m(station), ground_points_itrs_m(station, THREE_BEARINGS_DEG, distance)])
 
 
@@ -41,7 +43,7 @@ def search_grid(view: PassView, station: Station, margin_deg: float) -> Array:
         is_in = off <= margin_deg - GUARD_DEG
         low, high = np.where(is_in, middle, low), np.where(is_in, high, middle)
     rings = [ground_points_itrs_m(station, bearings, low * ring / SEARCH_RINGS) for ring in range(1, SEARCH_RINGS + 1)]
-    return np.vstack([three_stations(station, margin_deg), *rings])
+    return np.vstack([three_stations(view, station, margin_deg), *rings])
 
 
 def peak_rates_deg_s(view: PassView, points_itrs_m: Array) -> Array:
