@@ -1,0 +1,81 @@
+"""Between a geometric direction and the encoders: refraction, then the mount; both ways, with partials.  Pure.
+
+Geometric (a vacuum, from the orbit) -> apparent (in air) -> encoders (what the ACU counts).  Everything that compares a
+reading with an orbit, or commands a direction, goes through here once.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from acu_daemon.pointing.mount import TERMS, Mount, shares
+from acu_daemon.pointing.refraction import Refraction
+from acu_daemon.units import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Partials:
+    """Derivatives of the encoders (azimuth, elevation) at N directions.
+
+    by_direction: (N, 2, 2) or (2, 2), by geometric azimuth and elevation; by_state: (N, 2, 8) or (2, 8), by STATES:
+    the mount's terms (deg / deg) and the scale of the refraction (deg).
+    """
+
+    by_direction: Array
+    by_state: Array
+
+
+STATES = (*TERMS, "refraction_scale")
+
+
+@dataclass(frozen=True, slots=True)
+class AntennaModel:
+    """A mount in air; refraction None is a vacuum.  Angles in degrees, () or (N,); azimuths continuous, not wrapped."""
+
+    mount: Mount = Mount()
+    refraction: Refraction | None = None
+    refraction_scale: float = 1.0
+
+    def encoders_deg(
+        self, az_deg: npt.ArrayLike, el_deg: npt.ArrayLike, range_m: npt.ArrayLike = np.inf
+    ) -> tuple[Array, Array]:
+        """Turn a geometric direction, and the satellite's distance, into what the encoders read on it."""
+        if self.refraction is not None:
+            el_deg = self.refraction.apparent_el_deg(el_deg, range_m, self.refraction_scale)
+        return self.mount.encoders_deg(az_deg, el_deg)
+
+    def geometric_deg(
+        self, encoder_az_deg: npt.ArrayLike, encoder_el_deg: npt.ArrayLike, range_m: npt.ArrayLike = np.inf
+    ) -> tuple[Array, Array]:
+        """Turn what the encoders read into the geometric direction of the satellite, whose distance is range_m.
+
+        The inverse of encoders_deg.  A distance that is wrong by a tenth costs 0.0006 deg at 5 deg of elevation.
+        """
+        az, el = self.mount.beam_deg(encoder_az_deg, encoder_el_deg)
+        if self.refraction is not None:
+            el = self.refraction.geometric_el_deg(el, range_m, self.refraction_scale)
+        return az, el
+
+    def with_partials(
+        self, az_deg: npt.ArrayLike, el_deg: npt.ArrayLike, range_m: npt.ArrayLike = np.inf
+    ) -> tuple[Array, Array, Partials]:
+        """Give encoders_deg, with the derivatives.  The one by the range is left out: 3e-6 deg per km at 5 deg."""
+        az = np.asarray(az_deg, dtype=np.float64)
+        el: Array = np.asarray(el_deg, dtype=np.float64)
+        slope, by_scale = np.ones_like(el), np.zeros_like(el)
+        if self.refraction is not None:
+            el, slope, by_scale = self.refraction.apparent_with_slope(el, range_m, self.refraction_scale)
+        az, el, slope, by_scale = np.broadcast_arrays(az, el, slope, by_scale)
+        azimuths, elevations = shares(az, el)
+        terms = self.mount.terms_deg()
+        (aa, ae), (ea, ee) = self.mount.by_direction(az, el)
+        by_direction = np.stack([np.stack([aa, ae * slope], axis=-1), np.stack([ea, ee * slope], axis=-1)], axis=-2)
+        by_state = np.stack(
+            [
+                np.concatenate([azimuths, (ae * by_scale)[..., None]], axis=-1),
+                np.concatenate([elevations, (ee * by_scale)[..., None]], axis=-1),
+            ],
+            axis=-2,
+        )
+        return az + azimuths @ terms, el + elevations @ terms, Partials(by_direction, by_state)

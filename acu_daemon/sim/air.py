@@ -1,0 +1,66 @@
+"""The simulator's own air: dry and wet parts that end at different heights, rays by Snell's law through thin shells.
+
+Not the product's: its profile is not exponential, its refractivity and vapour pressure are other formulas, its rays are
+marched through 700 shells of constant index, and nothing is imported from acu_daemon.pointing.
+
+Sources: Hopfield 1969, quartic profiles N_dry (1 - h / h_dry)^4 with h_dry = 40136 + 148.72 t (m, t in deg C), N_wet
+the same with 11 km; Smith and Weintraub 1953, N = 77.6 / T (P + 4810 e / T); Tetens 1930, saturated vapour.
+"""
+
+from dataclasses import dataclass
+from math import exp
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+_EARTH_M = 6371e3
+_WET_TOP_M = 11e3
+_APPARENT_DEG = np.concatenate([np.arange(0.0, 5.0, 0.05), np.arange(5.0, 20.0, 0.1), np.arange(20.0, 90.1, 0.5)])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimulatedAir:
+    """Rays of a set of apparent elevations, where they leave the air: made by `simulated_air`.
+
+    x_m, y_m: horizontally and vertically from the antenna; out_rad: elevation of the way on, at the antenna's horizon.
+    """
+
+    x_m: Array
+    y_m: Array
+    out_rad: Array
+
+    def apparent_el_deg(self, geometric_el_deg: float, range_m: float) -> float:
+        """Give the elevation at which a satellite appears, from that in a vacuum, 0.0001 deg.
+
+        Below the lowest ray, which leaves horizontally, the refraction is that of the lowest ray.
+        """
+        along, across = np.cos(self.out_rad), np.sin(self.out_rad)
+        passed_m = self.x_m * along + self.y_m * across
+        aside2 = self.x_m**2 + self.y_m**2 - passed_m**2
+        further_m = np.sqrt(np.maximum(range_m, 2e5) ** 2 - aside2) - passed_m
+        geometric = np.degrees(np.arctan2(self.y_m + further_m * across, self.x_m + further_m * along))
+        geometric[-1] = 90.0
+        return geometric_el_deg + float(np.interp(geometric_el_deg, geometric, _APPARENT_DEG - geometric))
+
+
+def simulated_air(
+    pressure_hpa: float, temperature_c: float, humidity_percent: float, height_m: float = 0.0, denser: float = 1.0
+) -> SimulatedAir:
+    """March the rays through the air of a weather at an antenna; denser multiplies the refractivity.  10 ms."""
+    kelvin = temperature_c + 273.16
+    vapour_hpa = humidity_percent / 100.0 * 6.1078 * exp(17.27 * temperature_c / (temperature_c + 237.3))
+    dry, wet = 77.6 * pressure_hpa / kelvin, 77.6 * 4810.0 * vapour_hpa / kelvin**2
+    dry_top_m = 40136.0 + 148.72 * temperature_c
+    edges_m = dry_top_m * np.linspace(0.0, 1.0, 701) ** 2  # 0.1 m at the ground, 120 m at the top
+    middles_m = (edges_m[1:] + edges_m[:-1]) / 2.0
+    wet_left = np.maximum(1.0 - middles_m / _WET_TOP_M, 0.0)
+    indices = 1.0 + 1e-6 * denser * (dry * (1.0 - middles_m / dry_top_m) ** 4 + wet * wet_left**4)
+    radii_m = _EARTH_M + height_m + edges_m
+    invariant = indices[0] * radii_m[0] * np.cos(np.radians(_APPARENT_DEG))
+    central = np.zeros_like(invariant)
+    for n, low_m, high_m in zip(indices, radii_m, radii_m[1:], strict=False):
+        central += np.arccos(invariant / (n * high_m)) - np.arccos(np.minimum(invariant / (n * low_m), 1.0))
+    x_m, y_m = radii_m[-1] * np.sin(central), radii_m[-1] * np.cos(central) - radii_m[0]
+    return SimulatedAir(x_m, y_m, np.arccos(invariant / radii_m[-1]) - central)
