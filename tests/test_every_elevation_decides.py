@@ -181,8 +181,9 @@ def test_on_another_turn_a_signal_is_heard_within_a_beam_on_the_sky(el_deg: floa
         far_deg = share * (HEARD_BEAMS * CONFIG.beamwidth_deg + 0.15 * SKY_DEG_S)
         az_deg, el = off_path(el_deg, course_deg, 0.0, far_deg)
         if abs(az_deg - 100.0) < 90.0:
-            found = causes(path, (az_deg - 360.0, el), TrackState.PREPOSITION, heard, 1.0)
-            assert (Cause.ON_POINT in found) == is_heard
+            for turn_deg in (-360.0, 360.0):
+                found = causes(path, (az_deg + turn_deg, el), TrackState.PREPOSITION, heard, 1.0)
+                assert (Cause.ON_POINT in found) == is_heard
 
 
 @el_places
