@@ -71,6 +71,35 @@ def test_p6_angle_and_time_are_those_of_the_configuration(bounds: Bounds) -> Non
     assert runs.after_s == pytest.approx(bounds.error_deg / 2.0 + bounds.error_s, abs=0.25)
 
 
+STRETCHES = st.lists(
+    st.tuples(
+        st.sampled_from(list(Duty)),
+        st.sampled_from([0.0, 0.3, -0.3, 4.0, -4.0, 15.0, -15.0, 43.0, -43.0, 70.0]),  # deg/s
+        st.sampled_from([None, 0.2, 1.5, -1.5, 8.0, -8.0]),  # from the axis to its command
+        st.booleans(),  # or the command stands where it began
+    ),
+    min_size=2,
+    max_size=6,
+)
+
+
+@given(STRETCHES)
+def test_p6_an_axis_is_judged_alike_in_both_directions(stretches) -> None:
+    watches, angle_deg, k = [AxisWatch(), AxisWatch()], 10.0, 0
+    for duty, rate_deg_s, gap_deg, stands in stretches:
+        command_deg = None if gap_deg is None else angle_deg + gap_deg
+        for _ in range(25):
+            k, angle_deg = k + 1, angle_deg + 0.1 * rate_deg_s
+            left_deg = command_deg - angle_deg if stands and command_deg is not None else gap_deg
+            problems = []
+            for which, side in enumerate((1, -1)):
+                left = None if left_deg is None else side * left_deg
+                one = AxisSeen(1000.0 + 0.1 * k, side * angle_deg, side * rate_deg_s, duty, left)
+                watches[which], problem = watch_axis(watches[which], one, LIMITS, BOUNDS)
+                problems.append(problem)
+            assert problems[0] == problems[1]
+
+
 def test_p6_an_axis_that_turns_the_wrong_way_is_found_within_a_few_degrees() -> None:
     found = follow([0.5 * t for t in ticks(20.0)], [-0.5 * 5.0 * max(t - 3.0, 0.0) ** 2 for t in ticks(20.0)])
     assert found is not None
@@ -93,10 +122,11 @@ def test_p6_an_axis_that_moves_in_a_mode_that_moves_nothing_is_found(rate_deg_s)
     assert found.after_s < 3.0 + 6.0
 
 
-def test_p6_an_axis_faster_than_any_drive_is_found_in_autotrack_too() -> None:
-    found = judge([60.0 * t for t in ticks(5.0)], [None] * 50, Duty.FREE)
+@pytest.mark.parametrize("side", [-1, 1])
+def test_p6_an_axis_faster_than_any_drive_is_found_in_autotrack_too(side: int) -> None:
+    found = judge([side * 60.0 * t for t in ticks(5.0)], [None] * 50, Duty.FREE)
     assert found is None  # each step is an encoder's jump
-    found = judge([42.5 * t for t in ticks(5.0)], [None] * 50, Duty.FREE)
+    found = judge([side * 42.5 * t for t in ticks(5.0)], [None] * 50, Duty.FREE)
     assert found is not None
     assert found.text == "moves faster than its drive can"
 
