@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import atheris
+import numpy as np
 import structlog
 
 with atheris.instrument_imports(include=["acu_daemon"]):
@@ -19,7 +20,12 @@ with atheris.instrument_imports(include=["acu_daemon"]):
     from acu_daemon.edge.carry_over import read_carry_over
     from acu_daemon.edge.elements_file import load_elements
     from acu_daemon.edge.recording import read_readings
-    from acu_daemon.errors import ConfigError, ElementsError, UsageError
+    from acu_daemon.errors import AttitudeError, ConfigError, ElementsError, UsageError
+    from acu_daemon.model import EarthOrientation
+    from acu_daemon.onboard.aem import parse_aem
+    from acu_daemon.onboard.aem_attitude import AemAttitude
+    from acu_daemon.onboard.parameter_file import read as read_parameters
+    from acu_daemon.onboard.recheck import check_certificate, check_peaks
     from acu_daemon.orbit.oem import parse_oem
     from acu_daemon.orbit.omm import parse_omm
     from acu_daemon.orbit.tle import parse_tle
@@ -105,8 +111,23 @@ def oem(data: bytes) -> None:
     parse_oem(data.decode("utf-8", "replace"), "f")
 
 
+def aem(data: bytes) -> None:
+    """A message that is read can be asked for the attitude at its first state."""
+    for segment in parse_aem(data.decode("utf-8", "replace"), "f")[0]:
+        with contextlib.suppress(AttitudeError):
+            AemAttitude([segment], EarthOrientation()).body_from_lvlh(segment.tai_s[:1], np.eye(3)[None])
+
+
+def tracking_parameters(data: bytes) -> None:
+    with contextlib.suppress(UsageError):
+        found = read_parameters(data.decode("utf-8", "replace"), "f")
+        check_peaks(found)
+        check_certificate(found, None)
+
+
 TARGETS: dict[str, Callable[[bytes], None]] = {
-    target.__name__: target for target in (codec, config, readings, scenario, carry_over, tle, omm, oem)
+    target.__name__: target
+    for target in (codec, config, readings, scenario, carry_over, tle, omm, oem, aem, tracking_parameters)
 }
 
 

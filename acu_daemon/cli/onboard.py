@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import asdict, replace
+from math import isfinite
 from pathlib import Path
 from typing import Annotated
 
@@ -130,8 +131,13 @@ def scenarios(
         rows = results_of(run_campaign(run_scenario, runs, jobs=jobs, dask=dask, on_done=on_done))
     typer.echo("\n".join(scenario_table(rows, margin_deg)))
     if json_file is not None:
-        kept = [{key: value for key, value in asdict(row).items() if value is not None} for row in rows]
+        kept = [{key: _finite(value) for key, value in asdict(row).items() if value is not None} for row in rows]
         write_ascii(json_file, json.dumps({"margin_deg": margin_deg, "rows": kept}, indent=1) + "\n")
+
+
+def _finite(value: object) -> object:
+    """JSON has no word for what is not a number: null."""
+    return None if isinstance(value, float) and not isfinite(value) else value
 
 
 def _chosen(planned: PlannedPass, method: str | None, objective: str | None) -> PlannedPass:

@@ -14,7 +14,16 @@ import numpy as np
 
 from acu_daemon.onboard.frames import turn
 from acu_daemon.orbit.element_set import Problem, place
-from acu_daemon.orbit.oem import SUPPORTED_FRAMES, Frame, epoch_tai_s, frame_named, numbers, required, time_system
+from acu_daemon.orbit.oem import (
+    SUPPORTED_FRAMES,
+    Frame,
+    epoch_tai_s,
+    frame_named,
+    numbers,
+    required,
+    time_system,
+    useable_span_tai_s,
+)
 from acu_daemon.orbit.oem_text import BadSegmentError, Layout, RawSegment, read_segments
 from acu_daemon.units import DEG, Array
 
@@ -123,6 +132,7 @@ def _segment(raw: RawSegment, file: str, body: str | None, *, is_xml: bool) -> A
     if falling.size:
         line, epoch, _ = raw.states[int(falling[0]) + 1]
         raise BadSegmentError(f"the times must rise, {epoch} does not", line)
+    start_tai_s, end_tai_s = useable_span_tai_s(raw, system, tai_s)
     quaternion = _quaternions(raw, kind, is_xml=is_xml)
     if not is_forward:
         quaternion = quaternion * [-1.0, -1.0, -1.0, 1.0]
@@ -130,8 +140,8 @@ def _segment(raw: RawSegment, file: str, body: str | None, *, is_xml: bool) -> A
         name=raw.fields.get("OBJECT_NAME", "") or "(no OBJECT_NAME)",
         reference=reference,
         body=body_name,
-        start_tai_s=float(tai_s[0]),
-        end_tai_s=float(tai_s[-1]),
+        start_tai_s=start_tai_s,
+        end_tai_s=end_tai_s,
         tai_s=tai_s,
         quaternion=quaternion,
         gaps=_gaps(raw, tai_s, quaternion),

@@ -96,7 +96,7 @@ def _segment(raw: RawSegment, file: str) -> OemSegment:
     tai_s = np.array([epoch_tai_s(epoch, system, line) for line, epoch, _ in raw.states])
     states = np.array([numbers(values, line) for line, _, values in raw.states]) * 1e3
     tai_s, states, notes = _without_repeats(raw, tai_s, states)
-    start_tai_s, end_tai_s = _span_tai_s(raw, system, tai_s)
+    start_tai_s, end_tai_s = useable_span_tai_s(raw, system, tai_s)
     return OemSegment(
         version=raw.version,
         name=raw.fields.get("OBJECT_NAME", "").strip() or "(no OBJECT_NAME)",
@@ -168,7 +168,7 @@ def required(raw: RawSegment, key: str) -> str:
     return value
 
 
-def _span_tai_s(raw: RawSegment, system: str, tai_s: Array) -> tuple[float, float]:
+def useable_span_tai_s(raw: RawSegment, system: str, tai_s: Array) -> tuple[float, float]:
     """The useable span, within the states; without one, that of the states."""
     first, last = float(tai_s[0]), float(tai_s[-1])
     if start := raw.fields.get("USEABLE_START_TIME"):
