@@ -24,8 +24,9 @@ from pathlib import Path
 import numpy as np
 from real_pass import pass_names, truth_path, truth_span, write_config
 from skyfield.api import EarthSatellite, load, wgs84
+from tables.console import progress
 from tables.outputs import output_file
-from tables.workers import run_script, worker_pool
+from tables.workers import run_script
 
 from acu_daemon.assist.estimator import EstimatorSettings, make_estimator
 from acu_daemon.assist.inversion import KnownElements, direction_cosines, invert
@@ -33,6 +34,7 @@ from acu_daemon.assist.prediction import predict
 from acu_daemon.cli import demo
 from acu_daemon.cli.options import Target, load_target
 from acu_daemon.cli.virtual_pass import Flight, fly
+from acu_daemon.edge.campaign import results_of, run_campaign
 from acu_daemon.model import (
     AxisLimits,
     Correction,
@@ -377,19 +379,14 @@ def main() -> int:
     jobs = [(name, case) for name in pass_names() if chosen.only in name for case in CASES]
     if not jobs:
         sys.exit("no real passes: ../shared/data/passes is not there, or --only fits none")
-    rows: list[Row] = []
-    with worker_pool() as pool:
+    rows = results_of(run_campaign(fly_real, jobs, name_of=lambda job: f"{job[0]}, {job[1]}", on_done=progress))
+    print(f"{'pass':42} {'case':17} {'worst':>7} {'any':>7} {'lost s':>6} {'limit':>6} {'relock':>6} {'regist':>7}  s")
+    for row in rows:
+        relock = "-" if row.relock_s is None else f"{row.relock_s:.2f}"
         print(
-            f"{'pass':42} {'case':17} {'worst':>7} {'any':>7} {'lost s':>6} {'limit':>6} {'relock':>6} {'regist':>7}  s"
+            f"{row.name:42} {row.case:17} {row.worst_deg:7.4f} {row.worst_anywhere_deg:7.4f} {row.lost_s:6.1f} "
+            f"{row.lost_limit_s:6.1f} {relock:>6} {row.register_deg:7.4f} {row.flight_s:4.1f}"
         )
-        for row in pool.map(fly_real, jobs):
-            rows.append(row)
-            relock = "-" if row.relock_s is None else f"{row.relock_s:.2f}"
-            print(
-                f"{row.name:42} {row.case:17} {row.worst_deg:7.4f} {row.worst_anywhere_deg:7.4f} {row.lost_s:6.1f} "
-                f"{row.lost_limit_s:6.1f} {relock:>6} {row.register_deg:7.4f} {row.flight_s:4.1f}",
-                flush=True,
-            )
     check = seed_check()
     print("\nloss at, deg   beam, deg   rate memory loses it after, s   assisted")
     for one in check:

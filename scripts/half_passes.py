@@ -14,7 +14,6 @@ for the ellipses alone; it needs brahe (pip install 'acu-daemon[accuracy]') and 
 import argparse
 import json
 from collections.abc import Callable
-from concurrent.futures import as_completed
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.util import find_spec
@@ -31,9 +30,10 @@ from tables.seed_figures import PASSES, SeedPass
 from tables.skies import Sky, readings_of, real_elements, real_sky
 from tables.trials import ASKED_WORST_DEG, Trial, tried
 from tables.true_pass import TruePass, true_passes
-from tables.workers import run_script, worker_pool
+from tables.workers import run_script
 
 from acu_daemon.assist.settings import EstimatorSettings
+from acu_daemon.edge.campaign import results_of, run_campaign
 from acu_daemon.model import AngleBias, Readings
 from acu_daemon.orbit.propagator import Propagator
 
@@ -164,22 +164,20 @@ def all_trials(draws: int, listed_count: int) -> dict[str, list[Trial]]:
     jobs = real_jobs(draws)
     for (label, wrong), seed in zip(LISTED.items(), np.random.SeedSequence(SEED).spawn(len(LISTED)), strict=True):
         jobs += [(label, partial(listed_trials, wrong, one)) for one in seed.spawn(listed_count // CHUNK)]
-    with worker_pool() as pool:
-        if find_spec("brahe") is None:
-            say("the papers' simulation is left out: it needs brahe, pip install -c constraints.txt '.[accuracy]'")
-        else:
-            for true_pass in pool.map(true_pass_of, PASSES):
-                jobs += [
-                    (label, partial(papers_trials, true_pass, *station, draws)) for label, station in STATIONS.items()
-                ]
-        futures = {pool.submit(work): k for k, (_, work) in enumerate(jobs)}
-        for count, job in enumerate(as_completed(futures), 1):
-            job.result()
-            progress(count, len(jobs))
+    if find_spec("brahe") is None:
+        say("the papers' simulation is left out: it needs brahe, pip install -c constraints.txt '.[accuracy]'")
+    else:
+        for true_pass in results_of(run_campaign(true_pass_of, PASSES)):
+            jobs += [(label, partial(papers_trials, true_pass, *station, draws)) for label, station in STATIONS.items()]
+    trials = results_of(run_campaign(_done, jobs, name_of=lambda job: job[0], on_done=progress))
     found: dict[str, list[Trial]] = {}
-    for job, k in sorted(futures.items(), key=lambda item: item[1]):
-        found.setdefault(jobs[k][0], []).extend(job.result())
+    for (label, _), some in zip(jobs, trials, strict=True):
+        found.setdefault(label, []).extend(some)
     return found
+
+
+def _done(job: tuple[str, Callable[[], list[Trial]]]) -> list[Trial]:
+    return job[1]()
 
 
 def passes_text(found: dict[str, list[Trial]]) -> str:

@@ -10,8 +10,8 @@ Errors are angles on the sky.  It needs brahe: pip install -c constraints.txt '.
 
 import argparse
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from functools import partial
 from importlib.util import find_spec
 
 import numpy as np
@@ -31,35 +31,38 @@ from tables.seed_001 import (
     verdict,
     where_beyond,
 )
-from tables.workers import run_script, worker_pool
+from tables.workers import run_script
+
+from acu_daemon.edge.campaign import results_of, run_campaign
 
 LOSS_STEP_S, SENSITIVITY_STEP_S = 10, 40
 SEED = 1982
 BANDS_DEG = (5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 80.0, 90.0)
 
 
-def try_all(
-    pool: ProcessPoolExecutor, passes: Sequence[LandsatPass], experiments: Sequence[Experiment], step_s: int
-) -> list[list[LossTrial]]:
+def try_all(passes: Sequence[LandsatPass], experiments: Sequence[Experiment], step_s: int) -> list[list[LossTrial]]:
     """Try every experiment on every pass; the losses of each experiment."""
     jobs = [(experiment, one, k) for experiment in experiments for k, one in enumerate(passes)]
-    steps = [step_s] * len(jobs)
+    tried = results_of(run_campaign(partial(_try_one, step_s), jobs, name_of=_named, on_done=progress))
     found: list[list[LossTrial]] = [[] for _ in experiments]
-    for count, trials in enumerate(pool.map(_try_one, jobs, steps), 1):
-        found[(count - 1) // len(passes)] += trials
-        progress(count, len(jobs))
+    for k, trials in enumerate(tried):
+        found[k // len(passes)] += trials
     return found
 
 
-def _try_one(job: tuple[Experiment, LandsatPass, int], step_s: int) -> list[LossTrial]:
+def _named(job: tuple[Experiment, LandsatPass, int]) -> str:
+    return f"{job[0]}, pass {job[2]}"
+
+
+def _try_one(step_s: int, job: tuple[Experiment, LandsatPass, int]) -> list[LossTrial]:
     experiment, one, number = job
     return loss_trials(one, experiment, step_s, np.random.default_rng((SEED, number)))
 
 
-def losses(pool: ProcessPoolExecutor, passes: list[LandsatPass]) -> dict[str, list[LossTrial]]:
+def losses(passes: list[LandsatPass]) -> dict[str, list[LossTrial]]:
     """2.4.1: print the table, and give the losses."""
     say("losses at every elevation")
-    found = try_all(pool, passes, EXPERIMENTS, LOSS_STEP_S)
+    found = try_all(passes, EXPERIMENTS, LOSS_STEP_S)
     names = (
         "method",
         f"s until {LIMIT_DEG:g}°, shortest",
@@ -94,7 +97,7 @@ def _print_where(trials: dict[str, list[LossTrial]]) -> None:
     print()
 
 
-def sensitivity(pool: ProcessPoolExecutor, passes: list[LandsatPass]) -> dict[str, tuple[list[float], list[float]]]:
+def sensitivity(passes: list[LandsatPass]) -> dict[str, tuple[list[float], list[float]]]:
     """2.4.3: print the table, and give the worst errors of each method against the errors of a and i."""
     say("sensitivity to errors of a and i")
     result = {}
@@ -103,7 +106,7 @@ def sensitivity(pool: ProcessPoolExecutor, passes: list[LandsatPass]) -> dict[st
     for method in SENSITIVE:
         cases = [replace(method, d_a_km=error) for error in A_ERRORS_KM]
         cases += [replace(method, d_i_deg=error) for error in I_ERRORS_DEG]
-        worst = [verdict(trials).worst_deg for trials in try_all(pool, passes, cases, SENSITIVITY_STEP_S)]
+        worst = [verdict(trials).worst_deg for trials in try_all(passes, cases, SENSITIVITY_STEP_S)]
         print(f"| {method.name} | " + " | ".join(f"{value:.3f}" for value in worst) + " |", flush=True)
         result[method.name] = (worst[: len(A_ERRORS_KM)], worst[len(A_ERRORS_KM) :])
     return result
@@ -122,10 +125,9 @@ def main() -> int:
         return 2
     say("integrating the orbit and placing the stations")
     passes = landsat_passes()
-    with worker_pool() as pool:
-        found = losses(pool, passes)
-        perigees = len(passes) // len(PERIGEES_DEG)
-        worst = sensitivity(pool, passes[:perigees] + passes[2 * perigees : 3 * perigees])
+    found = losses(passes)
+    perigees = len(passes) // len(PERIGEES_DEG)
+    worst = sensitivity(passes[:perigees] + passes[2 * perigees : 3 * perigees])
     if chosen.plots:
         plot_losses(chosen.plots / "seed-001-losses.png", found)
         plot_sensitivity(chosen.plots / "seed-001-sensitivity.png", worst)

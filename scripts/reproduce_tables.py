@@ -13,7 +13,7 @@ Errors are eps = sqrt(dA^2 + dh^2) without cos h, the largest over the predicted
 
 import argparse
 import json
-from concurrent.futures import as_completed
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -28,7 +28,9 @@ from tables.rows import Row, rows_of, table_text
 from tables.seed_figures import PASSES, PRINTED_PASS_8, SeedPass
 from tables.simulate import errors_over_time_deg, largest_errors_deg
 from tables.true_pass import TruePass, true_passes
-from tables.workers import run_script, worker_pool
+from tables.workers import run_script
+
+from acu_daemon.edge.campaign import results_of, run_campaign
 
 CHUNK = 5  # runs that a process does at once
 SEED = 1990
@@ -37,9 +39,10 @@ FIGURE_USED_S = 210  # Kuga and Carrara 1988, figures 5.2-5.7 show a loss in the
 
 
 def simulate_chunk(
-    true_pass: TruePass, methods: tuple[str, ...], runs: list[np.random.SeedSequence]
+    methods: tuple[str, ...], job: tuple[TruePass, list[np.random.SeedSequence]]
 ) -> dict[str, list[list[float]]]:
     """Do some runs of a pass by every method, with the same errors for all."""
+    true_pass, runs = job
     result: dict[str, list[list[float]]] = {name: [] for name in methods}
     for run in runs:
         errors = draw_errors(np.random.default_rng(run), true_pass.tai_s.size)
@@ -50,25 +53,20 @@ def simulate_chunk(
 
 def reproduce(passes: tuple[SeedPass, ...], methods: tuple[str, ...], run_count: int, seed: int) -> list[Row]:
     """Simulate every pass and give the rows, in the papers' order."""
-    with worker_pool() as pool:
-        orbits = dict.fromkeys(one.orbit for one in passes)
-        groups = [tuple(one for one in passes if one.orbit == orbit) for orbit in orbits]
-        say(f"integrating {len(orbits)} reference orbits")
-        found = {one.seed: one for group in pool.map(true_passes, groups) for one in group}
-        ordered = [found[one] for one in passes]
-        sequences = np.random.SeedSequence(seed).spawn(len(passes))
-        jobs = {}
-        for k, (true_pass, sequence) in enumerate(zip(ordered, sequences, strict=True)):
-            runs = sequence.spawn(run_count)
-            for start in range(0, run_count, CHUNK):
-                jobs[pool.submit(simulate_chunk, true_pass, methods, runs[start : start + CHUNK])] = (k, start)
-        done = {}
-        for count, job in enumerate(as_completed(jobs), 1):
-            done[jobs[job]] = job.result()
-            progress(count, len(jobs))
+    orbits = dict.fromkeys(one.orbit for one in passes)
+    groups = [tuple(one for one in passes if one.orbit == orbit) for orbit in orbits]
+    say(f"integrating {len(orbits)} reference orbits")
+    found = {one.seed: one for group in results_of(run_campaign(true_passes, groups)) for one in group}
+    ordered = [found[one] for one in passes]
+    jobs = []
+    for true_pass, sequence in zip(ordered, np.random.SeedSequence(seed).spawn(len(passes)), strict=True):
+        runs = sequence.spawn(run_count)
+        jobs += [(true_pass, runs[start : start + CHUNK]) for start in range(0, run_count, CHUNK)]
+    work = partial(simulate_chunk, methods)
+    done = results_of(run_campaign(work, jobs, name_of=lambda job: str(job[0].seed.label), on_done=progress))
     rows = []
-    for k, true_pass in enumerate(ordered):
-        chunks = [done[key] for key in sorted(done) if key[0] == k]
+    for true_pass in ordered:
+        chunks = [chunk for (one, _), chunk in zip(jobs, done, strict=True) if one is true_pass]
         eps_deg = {name: np.array([run for chunk in chunks for run in chunk[name]]) for name in methods}
         rows += rows_of(true_pass, eps_deg, bounds_deg(true_pass, np.random.default_rng(seed)))
     return rows

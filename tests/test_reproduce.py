@@ -159,15 +159,15 @@ def test_what_the_command_cannot_do_is_told_before_it_computes(
 INTERRUPTIBLE = """
 import signal
 import time
-from tables.workers import run_script, worker_pool
+from acu_daemon.edge.campaign import run_campaign
+from tables.workers import run_script
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's background jobs ignore
 
 def main():
-    with worker_pool() as pool:
-        work = [pool.submit(time.sleep, 60.0) for _ in range(9)]
-        print("begun", flush=True)
-        return work[0].result() or 0
+    print("begun", flush=True)
+    run_campaign(time.sleep, [60.0] * 9, jobs=2)
+    return 0
 
 run_script(main)
 """
