@@ -71,7 +71,7 @@ def command(
     else:
         _print(labelled, outcomes)
     if out is not None:
-        _draw(out, worlds, labelled, outcomes)
+        _draw(out, labelled, outcomes)
         typer.echo(f"figures in {out}", err=True)
 
 
@@ -154,7 +154,8 @@ def _make_directory(out: Path) -> None:
         raise UsageError(f"--out {out}: {error.strerror}") from None
 
 
-def _draw(out: Path, worlds: dict[str, Any], labelled: list[tuple[Any, str, Any]], outcomes: list[Any]) -> None:
+def _draw(out: Path, labelled: list[tuple[Any, str, Any]], outcomes: list[Any]) -> None:
+    from acu_daemon.edge.flux_file import PROFILES, load_flux
     from acu_daemon.groundtrack.environment import STEP_S
     from acu_daemon.groundtrack.smoothing import RECURSION, WINDOW, DriftSmoother
     from acu_daemon.report.groundtrack import plot_paper_run, plot_profiles, plot_windows
@@ -171,7 +172,7 @@ def _draw(out: Path, worlds: dict[str, Any], labelled: list[tuple[Any, str, Any]
         ]
     plot_windows(out / "figure-02.png", raw, smoothed)
     days = labelled[0][2].days
-    plot_profiles(out / "figure-03.png", {name: world.flux for name, world in worlds.items()}, days)
+    plot_profiles(out / "figure-03.png", {name: load_flux(name) for name in PROFILES}, days)
     for number, run in zip(
         ("04-05", "06", "08-09", "10"), [run for run, how, _ in labelled if how == "right"], strict=True
     ):

@@ -33,6 +33,7 @@ def plot_run(path: Path, outcome: Outcome) -> None:
     draw_drift(above, outcome)
     draw_sizes(below, outcome)
     below.set_xlabel("days")
+    _legend_below(figure, above)
     figure.savefig(path)
 
 
@@ -47,6 +48,7 @@ def plot_paper_run(path: Path, runs: dict[str, Outcome], title: str) -> None:
         draw_drift(above, outcome)
         draw_sizes(below, outcome)
         below.set_xlabel("days")
+    _legend_below(figure, grid[0, 0])
     figure.savefig(path)
 
 
@@ -59,7 +61,6 @@ def draw_drift(axes: Axes, outcome: Outcome) -> None:
     for limit_m in (-outcome.case.band_m, outcome.case.band_m):
         axes.axhline(limit_m, color=LIMIT, linewidth=0.8, linestyle="--")
     axes.set_ylabel("D, m (east positive)")
-    axes.legend(loc="lower right", fontsize=7, framealpha=0.8)
 
 
 def draw_sizes(axes: Axes, outcome: Outcome) -> None:
@@ -82,8 +83,8 @@ def plot_profiles(path: Path, profiles: dict[str, Flux], days: float) -> None:
     axes.axhspan(-100.0, 65.0, color="#eeeeee", zorder=0)
     axes.set_ylim(-80.0, 320.0)
     axes.set_xlabel("days")
-    axes.set_ylabel("F10.7, sfu (dotted: mean over 81 days; grey: no real sun)")
-    axes.legend(fontsize=8)
+    axes.set_ylabel("F10.7, sfu")
+    axes.legend(fontsize=8, title="dotted: mean over 81 days\ngrey: no real sun", title_fontsize=7)
     figure.savefig(path)
 
 
@@ -153,6 +154,11 @@ def plot_outlook(
 def dates(tai_s: Array) -> Array:
     """Matplotlib's days, for an axis of dates (`xaxis_date`)."""
     return np.array([unix_from_tai(one) / DAY_S for one in tai_s.tolist()])
+
+
+def _legend_below(figure: Figure, axes: Axes) -> None:
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), fontsize=8, frameon=False)
 
 
 def _figure(size_in: tuple[float, float]) -> Figure:
