@@ -147,6 +147,7 @@ def test_every_state_has_a_word_and_none_of_an_antenna_that_is_half_a_beam_off_i
         ({"state": "PREPOSITION", "is_on_path": False, "rise_in_s": 60.0}, "MOVING TO RISE"),
         ({"state": "PREPOSITION", "is_on_path": False}, "MOVING TO PATH"),
         ({"state": "PREPOSITION", "rise_in_s": 60.0}, "AT RISE"),
+        ({"state": "PREPOSITION"}, "NO SIGNAL YET"),
         ({"state": "ACQUIRE/TLE"}, "NO SIGNAL YET"),
         ({"state": "IDLE", "arming": "disarmed"}, "DISARMED"),
         ({"state": "IDLE", "set_in_s": -1.0}, "PASS OVER"),
@@ -239,7 +240,9 @@ def test_colours_repeat_what_words_say_and_are_left_out_where_nobody_wants_them(
     off = replace(HOLDING, off_path_deg=1.45, is_on_path=False)
     coloured = drawn({"TERM": "xterm"}, SEEN, off)
     assert "\033[32mTRACKING" in coloured
-    assert "\033[1;31mOFF PATH" in coloured
+    assert "\033[1;31mOFF PATH\033[0m 42 s" in coloured
+    moving = drawn({"TERM": "xterm"}, replace(SEEN, state="PREPOSITION", is_on_path=False, rise_in_s=60.0))
+    assert "\033[36mMOVING TO RISE\033[0m" in moving
     for environment in ({"TERM": "xterm", "NO_COLOR": "1"}, {"TERM": "dumb"}):
         plain = drawn(environment, SEEN, off)
         assert "\033[3" not in plain

@@ -58,7 +58,7 @@ def why_not(environment: Mapping[str, str]) -> str:
     if result == "success" and environment.get("EXIT_CODE") == "killed":
         return ""  # by the signal of a stop, while it started: its predecessor may have left the antenna moving
     if result == "success":
-        return "the daemon ended by itself and stopped the antenna"
+        return "the daemon ended by itself: its STOP was acknowledged, or it did not hold the antenna"
     if not (Path(environment.get("RUNTIME_DIRECTORY", "/nonexistent")) / FINAL).exists():
         return f"the daemon ended by {result or 'an unknown cause'} and is started again: a stop would end an autotrack"
     return ""

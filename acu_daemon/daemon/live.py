@@ -14,7 +14,7 @@ from typing import Protocol
 from acu_daemon.control.states import HOLDING, TrackState
 from acu_daemon.daemon import words
 from acu_daemon.daemon.snapshot import Snapshot
-from acu_daemon.daemon.verdict import Level, alarms, verdict
+from acu_daemon.daemon.verdict import Level, Verdict, alarms, verdict
 
 EVERY_TICKS = 2
 VERDICT_WIDTH = 10
@@ -110,7 +110,7 @@ class LiveLine:
             if self._is_dumb:
                 self._print(seen, lines)
             else:
-                self._draw(verdict(seen).level, head_count, lines)
+                self._draw(verdict(seen), head_count, lines)
 
     def _print(self, seen: Snapshot, lines: list[str]) -> None:
         told = (verdict(seen).word, *alarms(seen))
@@ -119,9 +119,9 @@ class LiveLine:
             self._stream.write("\n".join(lines) + "\n")
             self._stream.flush()
 
-    def _draw(self, level: Level, head_count: int, lines: list[str]) -> None:
+    def _draw(self, said: Verdict, head_count: int, lines: list[str]) -> None:
         if self._has_colours:
-            lines = _coloured(level, head_count, lines)
+            lines = _coloured(said, head_count, lines)
         self._stream.write(self._erase() + "\n".join(lines))
         self._stream.flush()
         self._drawn_count = len(lines)
@@ -137,12 +137,12 @@ class LiveLine:
             self._drawn_count = 0
 
 
-def _coloured(level: Level, head_count: int, lines: list[str]) -> list[str]:
+def _coloured(said: Verdict, head_count: int, lines: list[str]) -> list[str]:
     """The verdict in its colour; further lines of alarms in the worst; OFF in the worst."""
-    first = lines[0]
-    word, rest = first[:VERDICT_WIDTH], first[VERDICT_WIDTH:].replace(" OFF ", f" {_paint('OFF', Level.BAD)} ")
+    size = len(said.word)
+    rest = lines[0][size:].replace(" OFF ", f" {_paint('OFF', Level.BAD)} ")
     more = [_paint(line, Level.BAD) for line in lines[1:head_count]]
-    return [_paint(word, level) + rest, *more, *lines[head_count:]]
+    return [_paint(lines[0][:size], said.level) + rest, *more, *lines[head_count:]]
 
 
 def _paint(text: str, level: Level) -> str:

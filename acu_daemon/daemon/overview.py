@@ -1,5 +1,6 @@
 """What `acu-daemon status` prints for people: some lines, the verdict first, alarms next.  Pure."""
 
+from acu_daemon.control.states import TrackState
 from acu_daemon.daemon import words
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.daemon.verdict import alarms, verdict
@@ -49,6 +50,8 @@ def _path(seen: Snapshot) -> str:
     """Where the antenna points beside the path."""
     if seen.off_path_deg is None or seen.half_beam_deg is None:
         return ""
+    if seen.state == TrackState.PREPOSITION and not seen.is_on_path:
+        return f"{seen.off_path_deg:.1f} deg to go, measured"
     side = "ON" if seen.is_on_path else "OFF"
     return (
         f"{side} the path of the {seen.path}: {seen.off_path_deg:.3f} deg beside it, measured "

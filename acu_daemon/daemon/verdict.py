@@ -88,9 +88,12 @@ def _idle(seen: Snapshot) -> Verdict:
 
 
 def _before(seen: Snapshot) -> Verdict:
+    is_up = seen.rise_in_s is not None and seen.rise_in_s <= 0.0
     if seen.is_on_path:
+        if is_up:
+            return Verdict("NO SIGNAL YET", Level.WATCH, "the antenna has come to the path")
         return Verdict("AT RISE", Level.CALM, "the antenna stands where the pass begins")
-    if seen.rise_in_s is not None and seen.rise_in_s <= 0.0:
+    if is_up:
         return Verdict("MOVING TO PATH", Level.WATCH, "the satellite is up; the antenna is on its way to the path")
     return Verdict("MOVING TO RISE", Level.CALM, "the antenna is on its way to where the pass begins")
 
