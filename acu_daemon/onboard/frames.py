@@ -1,7 +1,7 @@
 """Frames from the Earth to the antenna's gimbal, every matrix passive: it turns the coordinates of a fixed vector.
 
 LVLH:    z towards the Earth's centre (geocentric, not the local vertical), y against the orbit's momentum (right of the
-         flight), x = y cross z, forward.  The momentum is the inertial one; that of Earth-fixed states is 3.3 deg off.
+         flight), x = y cross z, forward.  The momentum is the inertial one; that of Earth-fixed states is 3.7 deg off.
 Body:    Rx(roll) Ry(pitch) Rz(yaw) LVLH.  Positive roll turns the body's +Z towards LVLH -y, positive pitch
          turns it forward.
 Gimbal:  a mount matrix times body.  Azimuth about the gimbal's +Z from +X to +Y; elevation is the angle FROM +Z, so the

@@ -1,6 +1,6 @@
 """The quietest path between two bounds: first the least largest rate, then the least acceleration at that rate.
 
-Choosing and smoothing are one step: a path that is smoothed afterwards leaves the margin for up to 39 s.
+Choosing and smoothing are one step: a path that is smoothed afterwards leaves the margin.
 """
 
 from dataclasses import dataclass

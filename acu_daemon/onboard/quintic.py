@@ -2,8 +2,7 @@
 
 A path is what its joints are: value, rate and acceleration at each make every piece by quintic Hermite interpolation.
 These are all piecewise quintics with two continuous derivatives, the splines with knots of multiplicity three.
-Independently fitted pieces would undo what a path gains: jumps of 0.5 deg at the joints, and rates up to three times as
-high.
+Pieces fitted one by one would jump where they meet.
 """
 
 from dataclasses import dataclass

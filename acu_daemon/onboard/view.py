@@ -16,7 +16,7 @@ from acu_daemon.orbit.frames import itrs_from_teme, station_itrs_m, teme_from_it
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import DEG, Array
 
-FINE_S = 0.05  # checks: 20 Hz; at 1 s four of ten singular peaks hide between the samples
+FINE_S = 0.05  # checks: 20 Hz; the peak of a pass near the axis lasts a second
 PER_PLAN_STEP = 5  # plans are made at every fifth of those, 0.25 s
 
 
