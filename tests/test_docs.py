@@ -35,7 +35,10 @@ FENCE = re.compile(r"^( *)(`{3,})([^\n`]*)\n(.*?)^\1\2 *$", re.MULTILINE | re.DO
 LINK = re.compile(r"(?<!\\)!?\[[^\]]*\]\(\s*<?([^)<>\s]+)>?(?:\s+\"[^\"]*\")?\s*\)")
 HEADING = re.compile(r"^#{1,6} +(.+?) *#*$", re.MULTILINE)
 ELSEWHERE = ("http://", "https://", "mailto:")
-CITED_FILE = re.compile(r"(?<![\w./-])docs/[\w./-]*\w\.(?:md|json|png|svg)\b")
+CITED_FILE = re.compile(
+    r"(?<![\w./-])(?:docs/[\w./-]*\w\.(?:md|json|png|svg)|(?:acu_daemon|scripts|tests)/[a-z\d_/]+\.(?:py|sh))\b"
+)
+NAMED_PATH = re.compile(r"`((?:acu_daemon|config|docs|scripts|tests)/[\w./@-]+)(?:::[^`]*)?`")
 CITED_SECTION = re.compile(r"(?<![\w./-])docs/([\w/-]+\.md)`?,\s+(?=[A-Z][a-z])(.{1,60})")
 CITED_DECISION = re.compile(r"\b[Dd]ecisions?\s+(\d{4})(?:\s+and\s+(\d{4}))?|\bdecisions/(\d{4})\b")
 OUTSIDE = {
@@ -47,8 +50,6 @@ OUTSIDE = {
     ),
     "an issue by its number": re.compile(r"\b[Ii]ssues? #?\d+\b"),
 }
-# Cited already, written by the changes that bring their subject.
-COMING = {"docs/antenna-model.md", "docs/groundtrack.md"}
 # Being moved: they cite the same outside things, and are converted where they come to rest.
 NOT_YET = ("acu_daemon/control/", "acu_daemon/assist/", "acu_daemon/config")
 
@@ -151,8 +152,8 @@ def outside_citations(text: str) -> Iterator[str]:
 
 def wrong_citations(text: str) -> Iterator[str]:
     """Documents, sections and decisions that are cited and are not there."""
-    for name in CITED_FILE.findall(text):
-        if name not in COMING and not (ROOT / name).exists():
+    for name in (*CITED_FILE.findall(text), *NAMED_PATH.findall(text)):
+        if not (ROOT / name).exists():
             yield f"{name}: no such file"
     for name, after in CITED_SECTION.findall(re.sub(r"\s+", " ", text)):
         page = ROOT / "docs" / name
@@ -181,6 +182,7 @@ def test_nothing_cites_what_is_not_in_the_project(path: Path) -> None:
         "iss" + "ue 12",
         "docs/nowhere.md",
         "docs/protocol.md, Nowhere",
+        "`acu_daemon/nowhere.py`",
         "decision 9999",
     ],
 )
