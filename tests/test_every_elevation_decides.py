@@ -287,3 +287,20 @@ def test_an_azimuth_that_comes_to_its_path_enters_the_beam_as_slowly_at_every_el
         left_deg.append(abs(register.position_deg - 100.0) * cos_el)
         assert len(left_deg) < 200
     assert left_deg[-2] - left_deg[-1] < 1.2 * 0.1 * 0.5 / 1.2
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_an_elevation_that_outruns_its_drive_is_doubted_and_one_that_moves_is_not_confirmed_both_ways(
+    side: int,
+) -> None:
+    drive = AxisLimits(-270.0, 270.0, 2.0, 10.0)
+    here = Status(100.0, 40.0, AcuMode.STANDBY)
+    for share, is_believed in ((0.9, True), (1.1, False)):
+        doubt = Doubt(drive, drive)
+        doubt.believes(here, NOW)
+        jump_deg = side * share * (SLACK_DEG + RATE_MARGIN * 0.1 * drive.max_rate_deg_s)
+        assert doubt.believes(replace(here, el_deg=40.0 + jump_deg), NOW + 0.1) == is_believed
+        doubt = Doubt(drive, drive)
+        for k in range(CONFIRMED_COUNT):
+            doubt.believes(replace(here, el_deg=40.0 + side * k * share * CONFIRMED_DEG), NOW + 0.1 * k)
+        assert doubt.is_confirmed == is_believed
