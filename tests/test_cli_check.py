@@ -453,3 +453,8 @@ def test_a_daemon_that_may_not_be_asked_is_named_and_the_acu_that_it_holds_is_no
     found = lines(done)
     assert (found["running daemon"][0], found["ACU"][0], done.code) == ("WARN", "WARN", 0)
     assert "be root (sudo)" in found["running daemon"][1]
+    monkeypatch.undo()
+    monkeypatch.setattr(check, "_acu", held)
+    alone = acu_daemon("check", "--config", config, "--state", tmp_path / "state")
+    assert (alone.code, lines(alone)["ACU"][0]) == (1, "NO-GO")
+    assert "name its state directory with --state" in lines(alone)["ACU"][1]

@@ -123,8 +123,11 @@ def _findings(config: Path, satellite: str | None, now_tai_s: float, state: Path
         if daemon.seen is not None:
             return
     for finding in run_loop(_acu, station.acu):
-        is_ours = daemon is not None and finding.verdict == NO_GO and "another client holds" in finding.detail
-        yield replace(finding, verdict=WARN) if is_ours else finding
+        if finding.verdict == NO_GO and "another client holds" in finding.detail:
+            hint = "; if it is an acu-daemon, name its state directory with --state"
+            yield replace(finding, verdict=WARN) if daemon else replace(finding, detail=finding.detail + hint)
+        else:
+            yield finding
 
 
 def _held(daemon: OwnDaemon) -> Finding:
