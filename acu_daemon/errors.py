@@ -4,6 +4,7 @@ AcuDaemonError
 ├── UsageError              wrong use or configuration; exit status 2
 │   ├── ConfigError         a TOML file: says file, key, value, what was expected
 │   ├── ElementsError       an element set: says file, line, reason
+│   ├── EarthOrientationError  a file of Earth orientation or leap seconds: says file, line, reason
 │   └── AttitudeError       a satellite's attitude, from a file or a plan: says where and why
 ├── CampaignError           runs of a campaign failed; names them
 ├── ProfileError            no tracking profile of a satellite's antenna keeps to margin, ranges and limits
@@ -36,6 +37,10 @@ class CampaignError(AcuDaemonError):
 
 class AttitudeError(UsageError):
     """A satellite's attitude cannot be used; the message says where and why."""
+
+
+class EarthOrientationError(UsageError):
+    """A file of Earth orientation or of leap seconds cannot be used; the message names file, line and reason."""
 
 
 class ProfileError(AcuDaemonError):

@@ -13,12 +13,14 @@ import numpy as np
 
 from acu_daemon.units import DAY_S, Array
 
-_LEAP_DATES = (
+_LEAP_TEXTS = (
     *("1972-01-01", "1972-07-01", "1973-01-01", "1974-01-01", "1975-01-01", "1976-01-01", "1977-01-01"),
     *("1978-01-01", "1979-01-01", "1980-01-01", "1981-07-01", "1982-07-01", "1983-07-01", "1985-07-01"),
     *("1988-01-01", "1990-01-01", "1991-01-01", "1992-07-01", "1993-07-01", "1994-07-01", "1996-01-01"),
     *("1997-07-01", "1999-01-01", "2006-01-01", "2009-01-01", "2012-07-01", "2015-07-01", "2017-01-01"),
-)  # TAI-UTC becomes 10 s on the first date and one more on each later one; source: IERS Bulletin C
+)
+LEAP_DATES = tuple(date.fromisoformat(text) for text in _LEAP_TEXTS)
+# TAI-UTC becomes 10 s on the first date and one more on each later one; source: IERS Bulletin C
 
 _DAY_S = 86400
 _J2000_ORDINAL = date(2000, 1, 1).toordinal()
@@ -38,7 +40,7 @@ def _midnight_s(day: date) -> int:
     return (day.toordinal() - _J2000_ORDINAL) * _DAY_S - _DAY_S // 2
 
 
-_STEPS_UTC_S = [_midnight_s(date.fromisoformat(text)) for text in _LEAP_DATES]
+_STEPS_UTC_S = [_midnight_s(day) for day in LEAP_DATES]
 _STEPS_TAI_S = [utc_s + 10 + i for i, utc_s in enumerate(_STEPS_UTC_S)]
 _STEPS_TAI_ARRAY = np.array(_STEPS_TAI_S, dtype=np.float64)
 _LEAP_SECONDS_TAI_S = frozenset(tai_s - 1 for tai_s in _STEPS_TAI_S[1:])
