@@ -202,3 +202,10 @@ def test_a_row_of_the_search_is_mirrored_with_its_path(
         other = go_on(other, other_path, mirror.reading(reading), t, STEP_S, other_config)
         assert (other.side, other.row, other.is_moving) == (scan.side, -scan.row, scan.is_moving)
         assert other.along_s == pytest.approx(scan.along_s, abs=1e-6)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_an_axis_at_its_rate_does_not_catch_what_is_a_little_ahead_to_either_side(side: float) -> None:
+    drive = AxisLimits(-270.0, 270.0, 20.0, 10.0)
+    after = step(AxisState(0.0, side * 20.0), side * 2.01, side * 20.0, STEP_S, drive)
+    assert side * after.position_deg == pytest.approx(2.0)
