@@ -157,6 +157,12 @@ class Rig:
     def errors(self) -> Path:
         return self.directory / "daemon.err"
 
+    @property
+    def kept(self) -> Path:
+        """The folder of the daemon's state, once it has one."""
+        state = self.directory / "state-rehearsal"
+        return next(state.glob("*@*"), state)
+
     def arguments(self, command: str) -> list[str]:
         """What both commands have in common."""
         clock = ["--at", utc_text(self.scene.start_tai_s, 6), "--at-monotonic", f"{self.at_monotonic_s:.6f}"]

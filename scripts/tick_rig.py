@@ -139,7 +139,7 @@ def _spent(made: list[Rig]) -> _Spent:
 
 def _status(rig: Rig) -> dict[str, float]:
     """The daemon's snapshot over its control socket; a rehearsal's state is in a directory of its own."""
-    status: dict[str, float] = json.loads(ask(rig.directory / "state-rehearsal", "status"))
+    status: dict[str, float] = json.loads(ask(rig.kept, "status"))
     return status
 
 

@@ -18,7 +18,7 @@ from test_live_line import SEEN
 from acu_daemon.cli import check, own_daemon
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.control_socket import SOCKET
-from acu_daemon.edge.state import SNAPSHOT
+from acu_daemon.edge.state import SNAPSHOT, Antenna, antenna_directory
 from acu_daemon.errors import AcuDaemonError
 from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.protocol.messages import (
@@ -355,6 +355,33 @@ def test_the_health_check_looks_only_whether_the_daemon_ticks(tmp_path: Path) ->
     stale = acu_daemon(*asked)
     assert stale.code == 1
     assert "s ago" in lines(stale)["running daemon"][1]
+
+
+def test_the_health_check_looks_at_the_antenna_of_its_configuration(tmp_path: Path) -> None:
+    mine, other = Antenna.of("station", "tcp://127.0.0.1:3842", "1"), Antenna.of("Natal", "serial:///dev/ttyS0", "1")
+    state = tmp_path / "state"
+    state.mkdir()
+    (antenna_directory(state, other) / SNAPSHOT).write_text("{}")
+    asked = ("check", "--config", write(tmp_path / "config"), "--running", "--state", state)
+    assert acu_daemon(*asked).code == 1
+    (antenna_directory(state, mine) / SNAPSHOT).write_text("{}")
+    assert acu_daemon(*asked).code == 0
+    done = acu_daemon(*asked, "--rehearsal")
+    assert done.code == 1
+    assert "state-rehearsal" in lines(done)["running daemon"][1]
+
+
+def test_a_latch_of_another_station_is_none_of_ours_and_ours_by_an_older_name_is(tmp_path: Path) -> None:
+    state = tmp_path / "state"
+    state.mkdir()
+    config = write(tmp_path / "config")
+    asked = ("check", "--config", config, "--state", state)
+    (antenna_directory(state, Antenna.of("Natal", "serial:///dev/ttyS0", "1")) / "latch").touch()
+    assert "latch" not in lines(acu_daemon(*asked))
+    (antenna_directory(state, Antenna.of("old name", "tcp://127.0.0.1:3842", "1")) / "latch").touch()
+    verdict, text = lines(acu_daemon(*asked))["latch"]
+    assert verdict == "NO-GO"
+    assert f"`acu-daemon clear --config {config} --state {state}`" in text
 
 
 def test_an_axis_whose_limits_do_not_hold_the_pass_is_a_warning_with_its_times(tmp_path: Path) -> None:

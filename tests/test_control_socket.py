@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import errno
 import os
+import shlex
 import socket
 import stat
 from pathlib import Path
@@ -11,8 +12,10 @@ from pathlib import Path
 import pytest
 import structlog
 from command_line import acu_daemon
+from config_files import STATION, write
 
 from acu_daemon.edge.control_socket import LONGEST_LINE, MOST_AT_ONCE, SOCKET, ControlSocket, ask
+from acu_daemon.edge.state import Antenna, antenna_directory
 from acu_daemon.errors import AcuDaemonError, UsageError
 
 
@@ -165,6 +168,53 @@ def test_without_a_daemon_every_word_says_what_to_do(word: str, tmp_path: Path) 
     assert "no daemon runs with this state directory" in done.err
     assert "--rehearsal" in done.err
     assert not (tmp_path / "nowhere").exists()
+
+
+def commands_in(text: str) -> list[list[str]]:
+    """The commands that are advised, each on a line of its own."""
+    lines = [line.removeprefix("acu-daemon: ") for line in text.splitlines()]
+    return [shlex.split(line) for line in lines if line.startswith("  acu-daemon ")]
+
+
+async def test_of_several_daemons_each_is_listed_with_a_command_that_reaches_it(tmp_path: Path) -> None:
+    state, urls = tmp_path / "state", {"one": "tcp://127.0.0.1:3842", "two": "serial:///dev/ttyS0"}
+    state.mkdir()
+    folders = {name: antenna_directory(state, Antenna.of(name, url, "1")) for name, url in urls.items()}
+    station = f'[station]\nname = "two"\n{STATION.split("[station]")[1]}'.replace(urls["one"], urls["two"])
+    config = write(tmp_path / "config", station)
+    one = ControlSocket(folders["one"], lambda _: "ok one")
+    two = ControlSocket(folders["two"], lambda _: "ok two; look, then `acu-daemon clear`")
+    for word in ("arm", "disarm", "clear"):
+        await one.open()
+        alone = await asyncio.to_thread(acu_daemon, word, "--state", state)
+        assert (alone.code, alone.out) == (0, "one\n")
+        assert (
+            f"no daemon of {config} runs"
+            in (await asyncio.to_thread(acu_daemon, word, "--state", state, "--config", config)).err
+        )
+        await two.open()
+        which = await asyncio.to_thread(acu_daemon, word, "--state", state)
+        assert which.code == 1
+        commands = commands_in(which.err)
+        answers = [(await asyncio.to_thread(acu_daemon, *command[1:])).out[:3] for command in commands]
+        assert answers == ["one", "two"]
+        chosen = await asyncio.to_thread(acu_daemon, word, "--state", state, "--config", config)
+        assert chosen.out == f"two; look, then `acu-daemon clear --config {config} --state {state}`\n"
+        await one.close()
+        await two.close()
+
+
+async def test_where_only_a_rehearsal_runs_the_command_for_it_is_told_and_works(tmp_path: Path) -> None:
+    folder = tmp_path / "state-rehearsal" / "a@b"
+    folder.mkdir(parents=True)
+    channel = ControlSocket(folder, answer)
+    await channel.open()
+    done = await asyncio.to_thread(acu_daemon, "clear", "--state", tmp_path / "state")
+    assert done.code == 1
+    (command,) = commands_in(done.err)
+    assert command[-1] == "--rehearsal"
+    assert (await asyncio.to_thread(acu_daemon, *command[1:])).out == "clear\n"
+    await channel.close()
 
 
 def test_no_permission_says_whose_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -90,7 +90,7 @@ class Crashes:
         self.errors += self.rig.errors.read_text()
 
     def snapshot(self) -> dict[str, Any]:
-        path = self.rig.directory / "state-rehearsal" / "snapshot.json"
+        path = self.rig.kept / "snapshot.json"
         seen: dict[str, Any] = json.loads(path.read_text())
         return seen
 

@@ -90,7 +90,7 @@ class Run:
         return self.disk.place / "readings.csv"
 
     def status(self) -> dict[str, Any]:
-        seen: dict[str, Any] = json.loads(ask(self.disk.place, "status"))
+        seen: dict[str, Any] = json.loads(ask(self.rig.kept, "status"))
         return seen
 
     def alarm(self) -> str:
@@ -142,30 +142,31 @@ class Run:
         self.disk.free()
         wait_until(lambda: self.alarm() == "" and self.has_told("record.resumed"), "everything is written again")
         self.mark()
-        wait_until((self.disk.place / CARRY_OVER).exists, "the fit is kept for the next pass")
-        wait_until(lambda: read_run_state(self.disk.place).fit is not None, "the fit is kept for a restart")
+        wait_until((self.rig.kept / CARRY_OVER).exists, "the fit is kept for the next pass")
+        wait_until(lambda: read_run_state(self.rig.kept).fit is not None, "the fit is kept for a restart")
         time.sleep(SLACK_S)
         self.mark()
         self.fill()
-        ask(self.disk.place, "disarm")
-        wait_until((self.disk.place / DISARMED).exists, "the disarm stands on the full disk")
+        ask(self.rig.kept, "disarm")
+        wait_until((self.rig.kept / DISARMED).exists, "the disarm stands on the full disk")
         self.kill_and_start()
         wait_until(lambda: self.has_told("acu.identified"), "the daemon is back")
         wait_until(lambda: self.status()["arming"] == "disarmed", "still disarmed")
-        ask(self.disk.place, "arm")
-        wait_until(lambda: not (self.disk.place / DISARMED).exists(), "armed again")
+        ask(self.rig.kept, "arm")
+        wait_until(lambda: not (self.rig.kept / DISARMED).exists(), "armed again")
         self.track()
         time.sleep(TRACKED_FULL_S)
         self.disk.free()
         wait_until(lambda: self.alarm() == "", "everything is written again")
         self.mark()
-        wait_until(lambda: read_run_state(self.disk.place).arming is True, "armed, also in its file")
+        wait_until(lambda: read_run_state(self.rig.kept).arming is True, "armed, also in its file")
         time.sleep(SLACK_S)
         self.mark()
         self.rig.daemon.send_signal(signal.SIGTERM)
         assert self.rig.daemon.wait(PATIENCE_S) == 0
         self.keep_log()
-        self.files = {path.name: path.read_bytes() for path in self.disk.place.iterdir()}
+        paths = [*self.rig.kept.iterdir(), self.recording]
+        self.files = {path.name: path.read_bytes() for path in paths}
         self.disk.make_read_only()
         self.rig.start_daemon()
         self.track()

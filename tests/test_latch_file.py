@@ -122,3 +122,37 @@ def test_p6_what_could_not_be_written_is_written_at_a_later_tick(tmp_path: Path)
         assert writer.close(60.0)
     assert [log["event"] for log in logs] == ["latch.not_saved", "latch.saved_again"]
     assert read_latch(directory) == TEXT
+
+
+def see_with_older(directory: Path, older: list[Path], *latches: str, is_left_out: bool = False) -> None:
+    writer = Writer("files")
+    first = "" if is_left_out else read_latch(directory, LATCH, older)
+    keeper = LatchKeeper(directory, writer, first, NoonClock(), LATCH, older, is_left_out=is_left_out)
+    for latch in latches:
+        keeper.see(latch)
+        while writer.waiting_count or keeper._latest._is_waiting:
+            pass
+    assert writer.close(60.0)
+
+
+def test_p6_a_latch_under_an_older_name_of_the_antenna_holds_until_a_person_clears_it(tmp_path: Path) -> None:
+    plain, renamed, own = tmp_path, tmp_path / "old@acu", tmp_path / "new@acu"
+    for folder in (renamed, own):
+        folder.mkdir()
+    for older in ([plain], [renamed], [plain, renamed]):
+        for folder in older:
+            (folder / LATCH).write_text(f"{TEXT}\n2000-01-01T12:00:00.000Z\n")
+        with capture_logs() as logs:
+            assert read_latch(own, LATCH, [plain, renamed]) == TEXT
+        assert logs[0]["file"] == str(older[0] / LATCH)
+        see_with_older(own, [plain, renamed], TEXT, TEXT)
+        assert all((folder / LATCH).exists() for folder in older)
+        see_with_older(own, [plain, renamed], TEXT, "")
+        assert not any((folder / LATCH).exists() for folder in (plain, renamed, own))
+        assert read_latch(own, LATCH, [plain, renamed]) == ""
+
+
+def test_a_latch_of_another_rehearsal_is_left_out_and_gone_with_the_first_tick(tmp_path: Path) -> None:
+    (tmp_path / LATCH).write_text(f"{TEXT}\n2000-01-01T12:00:00.000Z\n")
+    see_with_older(tmp_path, [], "", is_left_out=True)
+    assert list(tmp_path.iterdir()) == []

@@ -46,7 +46,7 @@ class Unread:
 
     @property
     def state(self) -> Path:
-        place: Path = self.rig.directory / "state-rehearsal"
+        place: Path = self.rig.kept
         return place
 
     def seen(self) -> dict[str, Any]:
@@ -128,7 +128,7 @@ def test_p8_a_log_that_nobody_takes_holds_up_neither_the_ticks_nor_the_stop(
 
 def test_whatever_the_umask_others_may_neither_read_nor_write(unread: dict[str, "Future[Unread]"]) -> None:
     modes = unread["full"].result().modes
-    assert modes.pop("state-rehearsal") == 0o750
+    assert modes.pop(unread["full"].result().state.name) == 0o750
     assert modes.pop(SOCKET) == 0o660
     assert {RUN_STATE, "snapshot.json", "readings.csv"} <= set(modes)
     assert set(modes.values()) == {0o640}

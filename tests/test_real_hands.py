@@ -79,9 +79,9 @@ def test_p1_what_a_person_does_while_the_daemon_is_dead_and_a_disarm_outlive_it(
         wait_until(lambda: rig.state == "AUTOTRACK/FITTED")
         assert say(rig, "disarm").code == 0
         wait_until(lambda: seen(rig)["arming"] == "disarmed")
-        wait_until((rig.directory / "state-rehearsal" / "disarmed").exists)
+        wait_until((rig.kept / "disarmed").exists)
         rig.daemon.kill()
         rig.daemon.wait()
-        (rig.directory / "state-rehearsal" / "run.json").write_bytes(b"{")
+        (rig.kept / "run.json").write_bytes(b"{")
         start_again(rig)
         assert (seen(rig)["arming"], seen(rig)["disarmed_by"], seen(rig)["write_count"]) == ("disarmed", "a person", 0)

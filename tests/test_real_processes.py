@@ -86,12 +86,12 @@ def test_sigterm_stops_the_antenna_and_the_recording_can_be_replayed(rig: Any, t
 
 
 def test_what_a_run_leaves_begins_the_next_one_in_the_rehearsals_own_folder(rig: Any) -> None:
-    kept = rig.directory / "state-rehearsal" / "carry-over-99901.json"
     rig.start_acu()
     for is_first in (True, False):
         rig.start_daemon()
         wait_until(lambda: rig.state == "AUTOTRACK/FITTED")
         assert len(rig.events("carry_over.used")) == (0 if is_first else 1)
+        kept = rig.kept / "carry-over-99901.json"
         wait_until(kept.exists)
         rig.daemon.send_signal(signal.SIGTERM)
         assert rig.daemon.wait(PATIENCE_S) == 0

@@ -185,3 +185,13 @@ def test_p10_what_a_full_disk_refused_is_written_again_though_nothing_changes(tm
     assert [log["event"] for log in logs] == ["run_state.not_saved", "run_state.saved_again"]
     assert read_run_state(gone).arming is True
     assert keeper.problem == ""
+
+
+@pytest.mark.parametrize(
+    ("left_s", "now_s", "is_another"),
+    [(5.0, 5.9, False), (5.0, 6.1, True), (None, None, False), (5.0, None, False), (None, 5.0, False)],
+)
+def test_only_a_rehearsal_can_be_another_one_and_only_where_both_clocks_are_known(
+    left_s: float | None, now_s: float | None, is_another: bool
+) -> None:
+    assert replace(STATE, clock_s=left_s).is_of_another_rehearsal(now_s) is is_another

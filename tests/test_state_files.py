@@ -1,13 +1,28 @@
 """Where state lives, that a rehearsal keeps its own, and the snapshot that never stops a tick."""
 
+import errno
 import json
+import re
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from acu_daemon.edge.state import EVERY_TICKS, SNAPSHOT, SnapshotFile, state_directory
+from acu_daemon.edge.acu_place import file_name
+from acu_daemon.edge.state import (
+    EVERY_TICKS,
+    SNAPSHOT,
+    Antenna,
+    SnapshotFile,
+    antenna_directory,
+    choice_text,
+    older_folders,
+    state_directory,
+    with_choice,
+)
 from acu_daemon.edge.writer import Writer
 from acu_daemon.errors import UsageError
 
@@ -74,6 +89,75 @@ def test_a_user_without_a_home_is_told_what_to_do(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(Path, "home", homeless)
     with pytest.raises(UsageError, match=r"choose one with --state DIR$"):
         state_directory(None, is_rehearsal=False)
+
+
+URL = "tcp://127.0.0.1:3842"
+CUIABA = Antenna.of("Cuiaba", URL, "1")
+
+
+def test_each_antenna_has_a_folder_of_its_own_that_says_whose_it_is(tmp_path: Path) -> None:
+    others = [
+        Antenna.of("Alcantara", URL, "1"),
+        Antenna.of("Cuiaba", "tcp://127.0.0.1:3843", "1"),
+        Antenna.of("Cuiaba", URL, "2"),
+        Antenna.of("Cuiaba ", URL, "1"),
+        Antenna.of("cuiaba", URL, "1"),
+        Antenna.of("Cuiab\u00e1", URL, "1"),
+        Antenna.of("../Cuiaba", URL, "1"),
+        Antenna.of("Cuiaba@tcp", URL, "1"),
+        Antenna.of("", URL, "1"),
+        Antenna.of("x" * 300, URL, "1"),
+        Antenna.of("x" * 301, URL, "1"),
+    ]
+    folders = [antenna_directory(tmp_path, one) for one in (CUIABA, *others)]
+    assert len(set(folders)) == len(folders)
+    assert {folder.parent for folder in folders} == {tmp_path}
+    assert folders[0].name.startswith("Cuiaba-")
+    assert "@tcp-127.0.0.1-3842-1-" in folders[0].name
+    assert all(folder.stat().st_mode & 0o777 == 0o750 and folder.name.count("@") == 1 for folder in folders)
+    for same in ("tcp://localhost:3842", f"{URL}?baud=9600"):
+        assert antenna_directory(tmp_path, Antenna.of("Cuiaba", same, "1")) == folders[0]
+
+
+@given(st.text(max_size=80), st.text(max_size=80))
+def test_no_two_names_share_a_file_and_every_one_is_a_plain_word(one: str, other: str) -> None:
+    assert (file_name(one) == file_name(other)) == (one == other)
+    assert re.fullmatch(r"[\w.-]{8,60}", file_name(one), re.ASCII)
+    assert not file_name(one).startswith((".", "-"))
+
+
+def test_what_an_earlier_version_kept_and_older_names_of_the_antenna_are_found_and_no_others(tmp_path: Path) -> None:
+    renamed = antenna_directory(tmp_path, Antenna.of("Cuiaba old", URL, "1"))
+    moved = antenna_directory(tmp_path, Antenna.of("Cuiaba", "serial:///dev/ttyS0", "1"))
+    antenna_directory(tmp_path, Antenna.of("Natal", "serial:///dev/ttyS1", "1"))
+    antenna_directory(tmp_path, CUIABA)
+    (tmp_path / "some@file").touch()
+    assert older_folders(tmp_path, CUIABA) == (tmp_path, *sorted([renamed, moved]))
+    assert older_folders(tmp_path / "nowhere", CUIABA) == (tmp_path / "nowhere",)
+
+
+def test_on_a_full_disk_without_the_folder_the_directory_itself_serves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "mkdir", full)
+    assert antenna_directory(tmp_path, CUIABA) == tmp_path
+
+
+def test_advice_is_a_command_that_finds_the_daemon_from_anywhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    choice = choice_text(Path("my config"), Path("x"), is_rehearsal=True)
+    assert choice == f"--config '{tmp_path}/my config' --state {tmp_path}/x --rehearsal"
+    assert choice_text(Path("c"), None, is_rehearsal=False) == f"--config {tmp_path}/c"
+    monkeypatch.setenv("STATE_DIRECTORY", f"{tmp_path}/systemd:{tmp_path}/second")  # which no person's shell has
+    assert choice_text(None, None, is_rehearsal=False) == f"--state {tmp_path}/systemd"
+    text = "look, then `acu-daemon clear`; `acu-daemon run` starts"
+    assert with_choice(text, "--state '\\1'") == "look, then `acu-daemon clear --state '\\1'`; `acu-daemon run` starts"
+    assert with_choice(text, "") == text
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """`acu-daemon check`: go or no-go before a pass, a line per check."""
 
 import asyncio
+import contextlib
 import json
 import os
 import time
@@ -16,6 +17,7 @@ from acu_daemon.cli.options import (
     NEXT_PASS_DAYS,
     Config,
     Target,
+    antenna_of,
     ending,
     load_target,
     longest_lead,
@@ -26,7 +28,7 @@ from acu_daemon.cli.options import (
 )
 from acu_daemon.cli.own_daemon import OwnDaemon, find_daemon
 from acu_daemon.config import load_station, satellite_names
-from acu_daemon.config_tables import AcuSection
+from acu_daemon.config_tables import AcuSection, StationFile
 from acu_daemon.control.plan import plan_pass
 from acu_daemon.daemon.health import status_line
 from acu_daemon.daemon.port import AcuPort
@@ -36,7 +38,7 @@ from acu_daemon.edge.clock_sense import before_elements, before_release
 from acu_daemon.edge.latch import ADVICE, DISARMED, LATCH
 from acu_daemon.edge.link import check_rate, make_link
 from acu_daemon.edge.loop import run_loop
-from acu_daemon.edge.state import SNAPSHOT, state_directory, state_path
+from acu_daemon.edge.state import SNAPSHOT, choice_text, folders_in, older_folders, state_path, with_choice
 from acu_daemon.errors import AcuDaemonError, LinkError, OrbitError, UsageError
 from acu_daemon.model import Site
 from acu_daemon.orbit.passes import find_passes
@@ -77,6 +79,9 @@ def command(
         bool, typer.Option("--running", help="Only look whether the daemon that runs here ticks (for health checks).")
     ] = False,
     state: Annotated[Path | None, typer.Option("--state", metavar="DIR", help="The daemon's --state.")] = None,
+    rehearsal: Annotated[
+        bool, typer.Option("--rehearsal", help="With --running: look at the daemon that runs as a rehearsal (--at).")
+    ] = False,
 ) -> None:
     """Check everything a pass needs: files, clock, elements, next pass, cable wrap, axes, link, ACU.  Moves nothing.
 
@@ -85,7 +90,8 @@ def command(
     """
     now_tai_s = SystemClock().tai_s() if at is None else parse_utc("--at", at)
     worst = GO
-    for finding in [_running(state)] if running else _findings(config, satellite, now_tai_s, state):
+    found = _findings(config, satellite, now_tai_s, state)
+    for finding in [_running(config, state, is_rehearsal=rehearsal)] if running else found:
         typer.echo(f"{finding.verdict:6} {finding.what:22} {'; '.join(finding.detail.splitlines())}")
         if finding.verdict == NO_GO or (finding.verdict == WARN and worst == GO):
             worst = finding.verdict
@@ -104,7 +110,7 @@ def _findings(config: Path, satellite: str | None, now_tai_s: float, state: Path
     yield Finding(GO, "place", place_text(station.site, now_tai_s))
     if station.safety.arm == "manual":
         yield Finding(WARN, "arming", '[safety] arm = "manual": the daemon writes nothing until a person arms it')
-    yield from _left_behind(state_path(state, is_rehearsal=False))
+    yield from _left_behind(config, station, state)
     yield clock_finding()
     names = [satellite] if satellite else satellite_names(config)
     if not names:
@@ -154,15 +160,33 @@ def place_text(site: Site, now_tai_s: float) -> str:
     return f"{latitude}, {longitude}, {station.height_m:g} m; {when}"
 
 
-def _left_behind(directory: Path) -> Iterator[Finding]:
+def _left_behind(config: Path, station: StationFile, state: Path | None) -> Iterator[Finding]:
     """What of the last run forbids the next one to move."""
+    directory, antenna = state_path(state, is_rehearsal=False), antenna_of(station)
+    advice = {name: with_choice(text, choice_text(config, state, is_rehearsal=False)) for name, text in ADVICE.items()}
     for grade, name in ((NO_GO, LATCH), (WARN, DISARMED)):
-        if os.access(directory / name, os.F_OK):  # one that is not ours to look into says nothing
-            yield Finding(grade, name, f"{directory / name} is there: {ADVICE[name]}")
+        for folder in (antenna.folder(directory), *older_folders(directory, antenna)):
+            if os.access(folder / name, os.F_OK):  # one that is not ours to look into says nothing
+                yield Finding(grade, name, f"{folder / name} is there: {advice[name]}")
 
 
-def _running(state: Path | None) -> Finding:
-    path = state_directory(state, is_rehearsal=False) / SNAPSHOT
+def _snapshot(config: Path, directory: Path) -> Path:
+    """The newest one of the configuration's antenna, by this or an older name; of any, where it cannot be read."""
+    folders = [directory]
+    with contextlib.suppress(OSError):
+        folders = folders_in(directory)
+    with contextlib.suppress(UsageError):
+        antenna = antenna_of(load_station(config))
+        folders = [antenna.folder(directory), *older_folders(directory, antenna)]
+    ages = {}
+    for folder in folders:
+        with contextlib.suppress(OSError):
+            ages[folder / SNAPSHOT] = (folder / SNAPSHOT).stat().st_mtime
+    return max(ages, key=lambda path: ages[path], default=folders[0] / SNAPSHOT)
+
+
+def _running(config: Path, state: Path | None, *, is_rehearsal: bool) -> Finding:
+    path = _snapshot(config, state_path(state, is_rehearsal=is_rehearsal))
     try:
         age_s = time.time() - path.stat().st_mtime
     except OSError:

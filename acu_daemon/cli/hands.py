@@ -6,24 +6,34 @@ from typing import Annotated
 
 import typer
 
+from acu_daemon.cli.finding import find_daemon
 from acu_daemon.daemon.overview import status_lines
 from acu_daemon.daemon.snapshot import snapshot_of
 from acu_daemon.edge.control_socket import ask
-from acu_daemon.edge.state import state_path
+from acu_daemon.edge.state import choice_text, with_choice
 from acu_daemon.errors import AcuDaemonError
 
 State = Annotated[
     Path | None,
     typer.Option("--state", metavar="DIR", help="The running daemon's --state, if it was started with one."),
 ]
+Config = Annotated[
+    Path | None,
+    typer.Option(
+        "--config",
+        metavar="DIR",
+        help="The running daemon's configuration: needed only where several run.  Without it, several are listed.",
+    ),
+]
 Rehearsal = Annotated[bool, typer.Option("--rehearsal", help="The daemon that runs as a rehearsal (--at).")]
 
 
-def _say(word: str, state: Path | None, *, is_rehearsal: bool) -> None:
-    typer.echo(ask(state_path(state, is_rehearsal=is_rehearsal), word))
+def _say(word: str, config: Path | None, state: Path | None, *, is_rehearsal: bool) -> None:
+    answer = ask(find_daemon(word, config, state, is_rehearsal=is_rehearsal), word)
+    typer.echo(with_choice(answer, choice_text(config, state, is_rehearsal=is_rehearsal)))
 
 
-def arm(state: State = None, rehearsal: Rehearsal = False) -> None:
+def arm(config: Config = None, state: State = None, rehearsal: Rehearsal = False) -> None:
     """Let the running daemon move the antenna.
 
     Needed after `disarm`, after a STOP by another hand, the emergency stop or an open door: these hold through restarts
@@ -33,30 +43,31 @@ def arm(state: State = None, rehearsal: Rehearsal = False) -> None:
 
     Exit status: 0 armed; 1 no daemon, no permission, or it runs with --shadow.
     """
-    _say("arm", state, is_rehearsal=rehearsal)
+    _say("arm", config, state, is_rehearsal=rehearsal)
 
 
-def disarm(state: State = None, rehearsal: Rehearsal = False) -> None:
+def disarm(config: Config = None, state: State = None, rehearsal: Rehearsal = False) -> None:
     """Take the running daemon's hands off the antenna: STOP if it moves it, then nothing but polls.
 
     It goes on recording, fitting and predicting.  `acu-daemon arm` gives the antenna back.
 
     Exit status: 0 disarmed; 1 no daemon or no permission.
     """
-    _say("disarm", state, is_rehearsal=rehearsal)
+    _say("disarm", config, state, is_rehearsal=rehearsal)
 
 
-def clear(state: State = None, rehearsal: Rehearsal = False) -> None:
+def clear(config: Config = None, state: State = None, rehearsal: Rehearsal = False) -> None:
     """Clear the latch of an axis that stood still, ran away or turned the wrong way.  Look at the antenna first.
 
     An armed daemon goes on with the pass at once.  If the axis fails again, it is stopped and latched again.
 
     Exit status: 0 cleared, or nothing was latched; 1 no daemon or no permission.
     """
-    _say("clear", state, is_rehearsal=rehearsal)
+    _say("clear", config, state, is_rehearsal=rehearsal)
 
 
 def status(
+    config: Config = None,
     state: State = None,
     rehearsal: Rehearsal = False,
     as_json: Annotated[
@@ -69,7 +80,7 @@ def status(
 
     Exit status: 0; 1 no daemon or no permission.
     """
-    answer = ask(state_path(state, is_rehearsal=rehearsal), "status")
+    answer = ask(find_daemon("status", config, state, is_rehearsal=rehearsal), "status")
     if as_json:
         typer.echo(answer)
         return
@@ -77,4 +88,5 @@ def status(
         seen = snapshot_of(json.loads(answer))
     except (ValueError, TypeError) as error:
         raise AcuDaemonError(f"the daemon runs another version than this command ({error}); see --json") from None
-    typer.echo("\n".join(status_lines(seen)))
+    text = "\n".join(status_lines(seen))
+    typer.echo(with_choice(text, choice_text(config, state, is_rehearsal=rehearsal)))

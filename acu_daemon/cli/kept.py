@@ -1,5 +1,7 @@
 """What a run finds in the state directory, and what it leaves there for a restart and for the next pass."""
 
+import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -14,8 +16,8 @@ from acu_daemon.config import estimator_settings
 from acu_daemon.control.state import ControlState, Held
 from acu_daemon.edge.carry_over import FitKeeper, carry_over_path, read_carry_over
 from acu_daemon.edge.clock import SystemClock
-from acu_daemon.edge.latch import DISARMED, LatchKeeper, read_latch
-from acu_daemon.edge.run_state import RunState, RunStateKeeper, read_run_state
+from acu_daemon.edge.latch import DISARMED, LATCH, LatchKeeper, read_latch
+from acu_daemon.edge.run_state import RUN_STATE, RunState, RunStateKeeper, read_run_state
 from acu_daemon.edge.writer import Writer
 from acu_daemon.model import FitResult, Pass
 
@@ -58,15 +60,25 @@ class Kept:
         self.carry_over.flush()
 
 
-def open_kept(directory: Path, target: Target, coming: Pass, clock: SystemClock, files: Writer) -> Kept:
-    """Read what was left; say in the log what of it is used."""
+def open_kept(
+    directory: Path,
+    target: Target,
+    coming: Pass,
+    clock: SystemClock,
+    files: Writer,
+    older: Sequence[Path] = (),
+) -> Kept:
+    """Read what was left; say in the log what of it is used.  older: other folders of the same antenna."""
     source, site, now_tai_s = target.elements.propagator, target.station.site, clock.tai_s()
     clock_s = now_tai_s - clock.monotonic_s() if clock.is_rehearsal else None
-    left, latch, disarmed_by = read_run_state(directory), read_latch(directory), read_latch(directory, DISARMED)
+    left = read_run_state(_first_with(RUN_STATE, directory, older))
+    is_another = left.is_of_another_rehearsal(clock_s)
+    latch, disarmed_by = ("" if is_another else read_latch(directory, name, older) for name in (LATCH, DISARMED))
     is_same_pass = left.is_of(target.elements.label, coming, clock_s)
     state = _first_state(left if is_same_pass else RunState(), latch, disarmed_by)
     resumed = _resumed(left, target, now_tai_s) if is_same_pass else None
     path = carry_over_path(directory, target.satellite.satellite.norad_id, target.satellite.satellite.name)
+    from_path = _first_with(path.name, directory, older) / path.name
     first = RunState(
         satellite=target.elements.label,
         rise_tai_s=coming.rise_tai_s,
@@ -76,13 +88,18 @@ def open_kept(directory: Path, target: Target, coming: Pass, clock: SystemClock,
         fit=resumed,
     )
     return Kept(
-        carried=resumed or _carried(target, path, now_tai_s),
+        carried=resumed or _carried(target, from_path, now_tai_s),
         state=state,
         carry_over=FitKeeper(path, target.elements.label, partial(carry_over_of, source=source, site=site), files),
         run_state=RunStateKeeper(directory, files, first, partial(resume_of, source=source, site=site)),
-        latches=LatchKeeper(directory, files, latch, clock),
-        disarms=LatchKeeper(directory, files, disarmed_by, clock, DISARMED),
+        latches=LatchKeeper(directory, files, latch, clock, LATCH, older, is_left_out=is_another),
+        disarms=LatchKeeper(directory, files, disarmed_by, clock, DISARMED, older, is_left_out=is_another),
     )
+
+
+def _first_with(name: str, directory: Path, older: Sequence[Path]) -> Path:
+    """The antenna's own folder where it has the file, or where no older one has it either."""
+    return next((one for one in (directory, *older) if os.path.lexists(one / name)), directory)
 
 
 def _first_state(left: RunState, latch: str, disarmed_by: str) -> ControlState:

@@ -14,7 +14,7 @@ from acu_daemon.config_tables import SatelliteFile, StationFile
 from acu_daemon.control.approach import longest_lead_s
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.elements_file import LoadedElements, load_elements
-from acu_daemon.edge.state import refuse_world_writable
+from acu_daemon.edge.state import Antenna, refuse_world_writable
 from acu_daemon.errors import ElementsError, UsageError
 from acu_daemon.model import Pass
 from acu_daemon.orbit.passes import find_passes
@@ -71,6 +71,11 @@ def make_clock(at: str | None, at_monotonic_s: float | None) -> SystemClock:
             raise UsageError("--at-monotonic needs --at: it says at which instant that time holds")
         return SystemClock()
     return SystemClock(parse_utc("--at", at), PROCESS_START_S if at_monotonic_s is None else at_monotonic_s)
+
+
+def antenna_of(station: StationFile) -> Antenna:
+    """The antenna that a station's file is about, by which its state is kept."""
+    return Antenna.of(station.station.name, station.acu.url, station.acu.address)
 
 
 def check_duration(duration_s: float | None) -> None:

@@ -53,6 +53,7 @@ def _directories(state: Path | None) -> Iterator[Path]:
     for base in [*bases, *([SERVICES] if state is None else [])]:
         yield base
         try:
-            yield from sorted(path.parent for path in base.glob(f"*/{SOCKET}"))
+            for depth in ("*", "*/*"):  # an antenna's folder, and one in a service's directory
+                yield from sorted(path.parent for path in base.glob(f"{depth}/{SOCKET}"))
         except OSError:  # not ours to look into
             continue

@@ -27,6 +27,7 @@ from acu_daemon.cli.options import (
     Config,
     Satellite,
     Target,
+    antenna_of,
     check_duration,
     coming_pass,
     ending,
@@ -54,7 +55,7 @@ from acu_daemon.edge.recording import RecordingWriter
 from acu_daemon.edge.rehearsal_clock import Meeting, Role
 from acu_daemon.edge.scheduling import keep_to_this_thread, scheduling_text
 from acu_daemon.edge.signals import STOPS, take_signals
-from acu_daemon.edge.state import SnapshotFile, state_directory
+from acu_daemon.edge.state import SnapshotFile, antenna_directory, choice_text, older_folders, state_directory
 from acu_daemon.edge.systemd import Notifier
 from acu_daemon.edge.writer import QueuedStream, Writer
 from acu_daemon.errors import AcuDaemonError
@@ -91,7 +92,7 @@ def command(
         typer.Option(
             "--state",
             metavar="DIR",
-            help="Where state is kept, that of a rehearsal in DIR-rehearsal.  "
+            help="Where state is kept, that of a rehearsal in DIR-rehearsal, each antenna's in a folder of its own.  "
             "Default: $STATE_DIRECTORY, else the XDG state home.",
         ),
     ] = None,
@@ -131,6 +132,7 @@ def command(
             is_debug=log_level is LogLevel.DEBUG,
             before_line=live.clear if live else None,
             writer=output,
+            choice=choice_text(config, state, is_rehearsal=clock.is_rehearsal),
         )
         if not wait_for_clock(config, satellite, clock, end_s):
             return
@@ -139,9 +141,12 @@ def command(
         _tell_clock(met if clock.is_rehearsal else met_by_chance(target.station.acu.url, clock), clock)
         link = make_link(target.station.acu.url)
         check_rate(link, target.station.acu.period_s, target.station.acu.device_delay_s)
-        directory = state_directory(state, is_rehearsal=clock.is_rehearsal)
+        base = state_directory(state, is_rehearsal=clock.is_rehearsal)
+        antenna = antenna_of(target.station)
+        directory = antenna_directory(base, antenna)
         recording = ends.enter_context(RecordingWriter(record, files, clock.tai_s())) if record is not None else None
-        frame = Frame(config, satellite, clock, link, directory, files, end_s, shadow)
+        older = () if clock.is_rehearsal else older_folders(base, antenna)  # nothing is carried between rehearsals
+        frame = Frame(config, satellite, clock, link, directory, files, end_s, shadow, older)
         first = prepare(frame, target)
         runner = ends.enter_context(loop_runner())  # where the system denies even that, another start is refused too
         outcome = _watched(runner, _run(frame, first, live, recording))
@@ -168,7 +173,10 @@ def _load(config: Path, name: str, clock: SystemClock) -> Target:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """What stays the same from one run of this process to the next.  end_s: of --duration, on CLOCK_MONOTONIC."""
+    """What stays the same from one run of this process to the next.
+
+    end_s: of --duration, on CLOCK_MONOTONIC.  older: other folders of the same antenna's state.
+    """
 
     config: Path
     name: str
@@ -178,6 +186,7 @@ class Frame:
     files: Writer
     end_s: float
     is_shadow: bool
+    older: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,7 +206,7 @@ def prepare(frame: Frame, target: Target, memory: ControlState | None = None) ->
     clock = frame.clock
     coming = coming_pass(target, clock.tai_s())
     _announce(target, coming, clock, is_shadow=frame.is_shadow)
-    kept = open_kept(frame.directory, target, coming, clock, frame.files)
+    kept = open_kept(frame.directory, target, coming, clock, frame.files, frame.older)
     job = make_job(
         target,
         coming,

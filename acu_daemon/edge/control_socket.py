@@ -112,16 +112,34 @@ def ask(directory: Path, line: str) -> str:
     except PermissionError:
         raise AcuDaemonError(f"{path}: not permitted; be root (sudo), its user or in its group") from None
     except (FileNotFoundError, NotADirectoryError, ConnectionRefusedError):
-        raise AcuDaemonError(
-            f"{path}: no daemon runs with this state directory; name the --state it was started with "
-            "(--rehearsal for one started with --at), or start it: acu-daemon run"
-        ) from None
+        raise AcuDaemonError(no_daemon(directory)) from None
     except OSError as error:
         raise AcuDaemonError(f"{path}: the daemon does not answer: {error.strerror or error}") from None
     verdict, _, rest = reply.partition(" ")
     if verdict != "ok":
         raise AcuDaemonError(rest or f"{path}: the daemon gave no answer")
     return rest
+
+
+def no_daemon(directory: Path) -> str:
+    """That nobody is there, and what to do."""
+    return (
+        f"{directory}: no daemon runs with this state directory; name the --state it was started with "
+        "(--rehearsal for one started with --at), or start it: acu-daemon run"
+    )
+
+
+def is_answered(directory: Path) -> bool:
+    """Whether a daemon listens there, be it one that this user may not ask."""
+    try:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client, _address(directory) as address:
+            client.setblocking(False)
+            client.connect(address)
+    except (BlockingIOError, PermissionError):  # busy, or somebody else's
+        return True
+    except OSError:
+        return False
+    return True
 
 
 def _connect(client: socket.socket, directory: Path) -> None:

@@ -1,9 +1,12 @@
 """What forbids to move, in the state directory: `latch`, of an axis, and `disarmed`, each a file of its own.
 
-Its existence forbids, whatever it holds and whatever the pass: the text, and the UTC since when, each in a line.
+Its existence forbids, whatever it holds and whatever the pass: the text, and the UTC since when, each in a line.  One
+that is kept under an older name of the antenna (edge/state.py) stays where it is until a person clears it.
 """
 
 import contextlib
+import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +24,15 @@ ADVICE = {
 _LARGEST_BYTES = 1000
 
 
-def read_latch(directory: Path, name: str = LATCH) -> str:
-    """What is latched, or disarmed by; "" where there is no file.  One that cannot be read counts too, and says so."""
+def read_latch(directory: Path, name: str = LATCH, older: Sequence[Path] = ()) -> str:
+    """What is latched, or disarmed by; "" where there is no file.  One that cannot be read counts too, and says so.
+
+    older: other folders of the same antenna.
+    """
+    return next((text for one in (directory, *older) if (text := _read(one, name))), "")
+
+
+def _read(directory: Path, name: str) -> str:
     path, advice = directory / name, ADVICE[name]
     log: Any = structlog.get_logger("latch")
     try:
@@ -30,24 +40,36 @@ def read_latch(directory: Path, name: str = LATCH) -> str:
             text, since = file.read(_LARGEST_BYTES).decode("utf-8").splitlines()
         if not text.isprintable() or not text.strip():
             raise ValueError("no text")
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return ""
     except (OSError, ValueError) as error:
         log.error(f"{name}.unreadable", file=str(path), reason=str(error), action="it counts", advice=advice)
         return f"the file {name} in the state directory, which cannot be read: {advice}"
-    log.warning(f"{name}.kept", **{name: text}, since=since, advice=advice)
+    log.warning(f"{name}.kept", **{name: text}, since=since, file=str(path), advice=advice)
     return text
 
 
 class LatchKeeper:
     """Writes and removes a file.  The loop never waits for the disk; what fails is tried again at the next tick."""
 
-    def __init__(self, directory: Path, writer: Writer, first: str, clock: Clock, name: str = LATCH) -> None:
+    def __init__(
+        self,
+        directory: Path,
+        writer: Writer,
+        first: str,
+        clock: Clock,
+        name: str = LATCH,
+        older: Sequence[Path] = (),
+        *,
+        is_left_out: bool = False,
+    ) -> None:
+        """older: other folders of the same antenna.  is_left_out: what the file holds is not what it begins with."""
         self._name = name
+        self._older = [one / name for one in older]
         self._path = directory / name
         self._clock = clock
         self._wanted = first
-        self._saved: str | None = first  # None: who knows what the file holds now
+        self._saved: str | None = None if is_left_out else first  # None: who knows what the file holds now
         self._latest: Latest[str] = Latest(writer, self._save)
         self.problem = ""  # why what is wanted is not saved
 
@@ -76,7 +98,8 @@ class LatchKeeper:
 
     def _put(self, text: str) -> None:
         if not text:
-            remove_file(self._path)
+            for path in (*(one for one in self._older if os.path.lexists(one)), self._path):
+                remove_file(path)
             return
         try:
             replace_file(self._path, f"{text}\n{utc_text(self._clock.tai_s())}\n".encode())

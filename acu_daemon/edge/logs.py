@@ -10,6 +10,7 @@ from typing import Any
 import structlog
 
 from acu_daemon.edge.denied import denied
+from acu_daemon.edge.state import with_choice
 from acu_daemon.edge.writer import Writer, write_text
 from acu_daemon.orbit.timescales import utc_text
 
@@ -24,16 +25,18 @@ def configure_logs(
     is_debug: bool = False,
     before_line: Callable[[], None] | None = None,
     writer: Writer | None = None,
+    choice: str = "",
 ) -> None:
     """Set up the logs once.
 
     now_tai_s stamps every line with the daemon's own UTC; tags (SIMULATION, REHEARSAL) stand on every line; is_debug
     adds a line for each tick and fit; before_line clears the live line of a terminal first; writer prints the lines
-    beside the loop.
+    beside the loop; choice: the options by which the commands that lines advise find this daemon.
     """
 
     def stamp(_logger: Any, _name: str, entry: Entry) -> Entry:
-        return {"utc": utc_text(now_tai_s()), **entry, **tags}
+        said = {key: with_choice(value, choice) if isinstance(value, str) else value for key, value in entry.items()}
+        return {"utc": utc_text(now_tai_s()), **said, **tags}
 
     def readable(_logger: Any, name: str, entry: Entry) -> str:
         if before_line is not None:

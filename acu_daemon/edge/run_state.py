@@ -51,6 +51,10 @@ class RunState:
         is_same_time = self.rise_tai_s < coming.set_tai_s and coming.rise_tai_s < self.set_tai_s
         return is_same_clock and is_same_time and satellite == self.satellite
 
+    def is_of_another_rehearsal(self, clock_s: float | None) -> bool:
+        """Whether both are rehearsals, and not the same one."""
+        return clock_s is not None and self.clock_s is not None and abs(clock_s - self.clock_s) >= SAME_CLOCK_S
+
 
 def read_run_state(directory: Path) -> RunState:
     """Read run.json; the defaults where there is none, or, with an alarm in the log, where it cannot be used.
