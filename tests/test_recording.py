@@ -1,9 +1,11 @@
 """Recorded readings: what is written can be read, and every bad line is told by its number."""
 
 import errno
+import json
 import os
 import resource
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +15,13 @@ from hypothesis import strategies as st
 from structlog.testing import capture_logs
 from test_writer import stuck
 
+from acu_daemon import __version__
+from acu_daemon.edge import recording_whose
 from acu_daemon.edge.recording import RecordingWriter, read_readings
+from acu_daemon.edge.recording_whose import ElementsUsed, Whose, read_whose
 from acu_daemon.edge.writer import Writer
 from acu_daemon.errors import UsageError
-from acu_daemon.model import Reading
+from acu_daemon.model import Reading, Station
 from acu_daemon.orbit.timescales import tai_from_utc
 
 HEADER = "utc,az_deg,el_deg,locked"
@@ -239,11 +244,144 @@ def test_p10_a_disk_that_does_not_keep_up_is_told_once(tmp_path: Path) -> None:
     assert seconds_in(path)[0] == 100.0
 
 
+CUIABA = Station("Cuiaba", -15.53, -56.07, 277.0)
+SCD = Whose(CUIABA, "SCD-1", 22490, ElementsUsed("tle", "1989-01-31T09:58:00.000Z", "scd.tle"))
+NOAA = replace(SCD, satellite="NOAA-20", norad_id=43013)
+ELSEWHERE = replace(SCD, station=replace(CUIABA, longitude_deg=-44.4))
+FAR_S = 1e9
+
+
+def told(*seconds: float, path: Path, whose: Whose, now_tai_s: float = FAR_S) -> str:
+    """Record; returns what is said of a file that is not the one asked for."""
+    with capture_logs() as logs:
+        record(path, *seconds, whose=whose, now_tai_s=now_tai_s)
+    return "; ".join(str(log["reason"]) for log in logs if log["event"] == "record.beside")
+
+
+def test_a_recording_says_beside_it_whose_it_is_and_is_gone_on_with(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    assert told(100.0, path=path, whose=SCD) == ""
+    assert path.read_text().startswith(f"{HEADER}\n")
+    said = json.loads((tmp_path / "x.csv.json").read_text())
+    assert said["station"] == {"name": "Cuiaba", "latitude_deg": -15.53, "longitude_deg": -56.07, "height_m": 277.0}
+    assert said["satellite"] == {"name": "SCD-1", "norad_id": 22490}
+    assert said["elements"] == {"kind": "tle", "epoch_utc": "1989-01-31T09:58:00.000Z", "file": "scd.tle"}
+    assert said["version"] == __version__
+    newer = replace(SCD, elements=ElementsUsed("tle", "1989-02-01T09:58:00.000Z", "scd.tle"))
+    for whose in (SCD, newer, newer):
+        assert told(101.0, 102.0, path=path, whose=whose) == ""
+    assert seconds_in(path) == [100.0, 101.0, 102.0]
+    later = json.loads((tmp_path / "x.csv.json").read_text())["later"]
+    assert [run["elements"]["epoch_utc"] for run in later] == ["1989-02-01T09:58:00.000Z"]
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["x.csv", "x.csv.json"]
+
+
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [
+        (NOAA, "x.csv is of SCD-1 (22490) over Cuiaba"),
+        (replace(SCD, satellite="SCD-2", norad_id=None), "x.csv is of SCD-1 (22490) over Cuiaba"),
+        (ELSEWHERE, "x.csv is of SCD-1 (22490) over Cuiaba"),
+        (replace(SCD, is_rehearsal=True), "x.csv is of SCD-1 (22490) over Cuiaba"),
+    ],
+)
+def test_anothers_recording_is_left_alone_and_the_pass_goes_on_in_a_file_of_a_new_name(
+    tmp_path: Path, other: Whose, said: str
+) -> None:
+    path = tmp_path / "x.csv"
+    told(100.0, path=path, whose=SCD)
+    before = path.read_bytes(), (tmp_path / "x.csv.json").read_bytes()
+    assert told(200.0, path=path, whose=other) == said
+    assert told(201.0, path=path, whose=other) == said  # a restart finds its own
+    assert (path.read_bytes(), (tmp_path / "x.csv.json").read_bytes()) == before
+    assert seconds_in(tmp_path / "x-2.csv") == [200.0, 201.0]
+    assert read_whose(tmp_path / "x-2.csv") == other
+    assert told(102.0, path=path, whose=SCD) == ""
+    assert seconds_in(path) == [100.0, 102.0]
+
+
+@pytest.mark.parametrize("text", [None, "", "{", "[]", '{"format": 1}', '{"format": 2}', "\0" * 100, "[" * 5000])
+def test_a_recording_that_does_not_say_whose_it_is_is_left_alone_with_what_stands_beside_it(
+    tmp_path: Path, text: str | None
+) -> None:
+    path, beside = tmp_path / "x.csv", tmp_path / "x.csv.json"
+    record(path, 100.0)
+    if text is not None:
+        beside.write_text(text)
+    assert "x.csv.json" in told(101.0, path=path, whose=SCD)
+    assert seconds_in(path) == [100.0]
+    assert (beside.read_text() if beside.exists() else None) == text
+    assert seconds_in(tmp_path / "x-2.csv") == [101.0]
+
+
+def test_the_json_of_a_recording_that_was_moved_away_is_not_overwritten_by_anothers(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    told(100.0, path=path, whose=SCD)
+    path.rename(tmp_path / "moved.csv")
+    assert "x.csv is of SCD-1" in told(101.0, path=path, whose=NOAA)
+    assert read_whose(path) == SCD
+    assert not path.exists()
+
+
+def test_of_two_runs_at_once_each_has_a_file_of_its_own(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    with RecordingWriter(path, whose=SCD) as recording:
+        recording.add(Reading(100.0, 1.0, 2.0, True))
+        assert told(101.0, path=path, whose=SCD) == "another run records into x.csv"
+        recording.add(Reading(102.0, 1.0, 2.0, True))
+    assert (seconds_in(path), seconds_in(tmp_path / "x-2.csv")) == ([100.0, 102.0], [101.0])
+
+
+def test_a_recording_that_ends_later_than_now_or_in_no_reading_is_left_alone_too(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    told(100.0, path=path, whose=SCD)
+    assert "is later than now" in told(50.0, path=path, whose=SCD, now_tai_s=49.0)
+    path.write_text(f"{HEADER}\nx\n")
+    assert "is no reading" in told(51.0, path=path, whose=SCD, now_tai_s=50.9)
+    assert seconds_in(tmp_path / "x-2.csv") == [50.0, 51.0]
+
+
+def test_where_the_json_cannot_be_written_the_readings_are_and_it_follows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "x.csv"
+
+    def full(*_: Any, **__: Any) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with capture_logs() as logs:
+        with monkeypatch.context() as disk:
+            disk.setattr(recording_whose, "replace_file", full)
+            recording = RecordingWriter(path, whose=SCD)
+            for second in (100.0, 101.0):
+                recording.add(Reading(second, 1.0, 2.0, True))
+            assert "x.csv.json: " in recording.problem
+        recording.add(Reading(102.0, 1.0, 2.0, True))
+        assert recording.problem == ""
+        recording.close()
+    assert [log["event"] for log in logs] == ["record.whose_not_saved"]
+    assert (seconds_in(path), read_whose(path)) == ([100.0, 101.0, 102.0], SCD)
+
+
+def test_a_device_has_nothing_beside_it_and_a_foreign_file_is_refused_whoever_asks(tmp_path: Path) -> None:
+    told(100.0, path=Path("/dev/null"), whose=SCD)
+    assert not Path("/dev/null.json").exists()
+    path = tmp_path / "x.csv"
+    path.write_text("my thesis, which is longer than a header\n" * 3)
+    with pytest.raises(UsageError, match="this file is no recording and is left alone"):
+        record(path, 100.0, whose=SCD)
+    assert [one.name for one in tmp_path.iterdir()] == ["x.csv"]
+
+
 def test_a_recording_that_cannot_be_made_is_wrong_use(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"--record .*: No such file or directory"):
         RecordingWriter(tmp_path / "no" / "x.csv")
     with pytest.raises(UsageError, match=r"--record .*: Is a directory"):
         RecordingWriter(tmp_path)
+    (tmp_path / "file").touch()
+    for below in ("no/x.csv", "file/x.csv", "x" * 300):
+        with pytest.raises(UsageError, match=r"--record "):
+            RecordingWriter(tmp_path / below, whose=SCD)
 
 
 def test_angles_may_be_empty_where_locked_is_0(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import structlog
 import typer
 
-from acu_daemon.cli.options import Target, coming_pass, load_target
+from acu_daemon.cli.options import Target, coming_pass, load_target, whose_recording
 from acu_daemon.cli.run import make_job
 from acu_daemon.daemon.live import LiveLine
 from acu_daemon.daemon.port import AcuPort
@@ -169,7 +169,7 @@ async def _assisted(config: Path, url: str, clock: SystemClock, sky: Sky, record
         if live is not None:
             live.show(seen, beam_error_deg=_beam_error_deg(seen, sky))
 
-    with RecordingWriter(recording_path) as recording:
+    with RecordingWriter(recording_path, whose=whose_recording(target, is_rehearsal=True)) as recording:
         service = Service(job, link, clock, ProcessFitRunner(job.refit), on_snapshot=show, on_reading=recording.add)
         take_signals(asyncio.get_running_loop(), service.stop, tell_signal)
         try:

@@ -29,7 +29,8 @@ def find_daemon(word: str, config: Path | None, state: Path | None, *, is_rehear
         raise AcuDaemonError(no_daemon(directory))
     kind = "a rehearsal does, and is" if not is_rehearsal else "one that is no rehearsal does, and is"
     choice = choice_text(config, state, is_rehearsal=not is_rehearsal)
-    commands = [f"  acu-daemon {word} {choice}".rstrip()] if len(others) == 1 else _commands(word, others)
+    is_found_so = len(others) == 1 and config is None
+    commands = [f"  acu-daemon {word} {choice}".rstrip()] if is_found_so else _commands(word, others)
     raise AcuDaemonError("\n".join([f"{no_daemon(directory)}; {kind} asked by:", *commands]))
 
 

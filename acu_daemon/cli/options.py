@@ -14,6 +14,7 @@ from acu_daemon.config_tables import SatelliteFile, StationFile
 from acu_daemon.control.approach import longest_lead_s
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.elements_file import LoadedElements, load_elements
+from acu_daemon.edge.recording_whose import ElementsUsed, Whose
 from acu_daemon.edge.state import Antenna, refuse_world_writable
 from acu_daemon.errors import ElementsError, UsageError
 from acu_daemon.model import Pass
@@ -91,6 +92,14 @@ class Target:
     station: StationFile
     satellite: SatelliteFile
     elements: LoadedElements
+
+
+def whose_recording(target: Target, *, is_rehearsal: bool) -> Whose:
+    """Whose the readings of a run are."""
+    satellite, elements = target.satellite.satellite, target.elements
+    file = getattr(target.satellite.elements, "file", "")
+    used = ElementsUsed(elements.propagator.kind, utc_text(elements.epoch_tai_s), file)
+    return Whose(target.station.site.station, satellite.name, satellite.norad_id, used, is_rehearsal)
 
 
 def load_target(

@@ -33,6 +33,7 @@ from acu_daemon.cli.options import (
     ending,
     load_target,
     nearest_to_pass,
+    whose_recording,
 )
 from acu_daemon.cli.rehearsal import clock_text, meet_in_rehearsal, met_by_chance
 from acu_daemon.config import control_config, estimator_settings, load_station
@@ -85,7 +86,12 @@ def command(
     ] = None,
     record: Annotated[
         Path | None,
-        typer.Option("--record", metavar="FILE", help="Write the readings as CSV; `acu-daemon replay` reads it."),
+        typer.Option(
+            "--record",
+            metavar="FILE",
+            help="Write the readings as CSV, and whose they are into FILE.json, for `acu-daemon replay`.  A file of "
+            "another satellite or station is left alone: another one is begun beside it.",
+        ),
     ] = None,
     state: Annotated[
         Path | None,
@@ -144,7 +150,10 @@ def command(
         base = state_directory(state, is_rehearsal=clock.is_rehearsal)
         antenna = antenna_of(target.station)
         directory = antenna_directory(base, antenna)
-        recording = ends.enter_context(RecordingWriter(record, files, clock.tai_s())) if record is not None else None
+        whose = whose_recording(target, is_rehearsal=clock.is_rehearsal)
+        recording = None
+        if record is not None:
+            recording = ends.enter_context(RecordingWriter(record, files, clock.tai_s(), whose))
         older = () if clock.is_rehearsal else older_folders(base, antenna)  # nothing is carried between rehearsals
         frame = Frame(config, satellite, clock, link, directory, files, end_s, shadow, older)
         first = prepare(frame, target)
