@@ -209,3 +209,16 @@ def test_an_axis_at_its_rate_does_not_catch_what_is_a_little_ahead_to_either_sid
     drive = AxisLimits(-270.0, 270.0, 20.0, 10.0)
     after = step(AxisState(0.0, side * 20.0), side * 2.01, side * 20.0, STEP_S, drive)
     assert side * after.position_deg == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("limits_deg", [(-270.0, 270.0), (-181.0, 340.0), (-100.0, 300.0)])
+def test_over_the_zenith_the_turn_that_holds_both_ways_is_mirrored_with_the_path(
+    limits_deg: tuple[float, float],
+) -> None:
+    limits = AxisLimits(*limits_deg, 20.0, 10.0)
+    az, _, el = zenith_path(88.0, 0.8, 0.0)
+    for bearing_deg in range(3, 363, 15):
+        for present_deg in (-151.0, 17.0, 160.0):
+            turn = choose_turn(az + bearing_deg, el, limits, present_deg)
+            other = choose_turn(-az - bearing_deg, el, mirrored(limits), -present_deg)
+            assert replace(other, offset_deg=-other.offset_deg) == turn
