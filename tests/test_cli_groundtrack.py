@@ -85,8 +85,9 @@ def test_the_moderate_profile_is_that_of_the_paper() -> None:
     assert year.min() == pytest.approx(115.0, abs=1.5)
 
 
-def made_profile(path: Path, *, days: int = 600, skip: int | None = None, flux: str = "120") -> Path:
-    first = date(2009, 11, 1)
+def made_profile(
+    path: Path, *, days: int = 600, skip: int | None = None, flux: str = "120", first: date = date(2009, 11, 1)
+) -> Path:
     rows = [f"{first + timedelta(days=day)},{flux},2.0" for day in range(days) if day != skip]
     path.write_text("\n".join(["date,f107_sfu,kp", *rows]) + "\n")
     return path
@@ -95,6 +96,11 @@ def made_profile(path: Path, *, days: int = 600, skip: int | None = None, flux: 
 def test_a_profile_of_ones_own_is_taken(tmp_path: Path) -> None:
     path = made_profile(tmp_path / "mine.csv")
     assert json.loads(simulate("--json", "--profile", path))["profile"] == str(path)
+
+
+def test_a_profile_of_other_years_begins_with_its_first_day(tmp_path: Path) -> None:
+    found = json.loads(simulate("--json", "--profile", made_profile(tmp_path / "later.csv", first=date(2024, 3, 1))))
+    assert found["manoeuvres"][0]["utc"].startswith("2024-")
 
 
 def test_fluxes_outside_the_fit_are_warned_of(tmp_path: Path) -> None:

@@ -137,6 +137,15 @@ def test_a_file_that_is_not_there_and_one_without_sets_are_told(tmp_path: Path) 
     assert "no element set" in done.err
 
 
+def test_sets_a_whole_cycle_apart_are_not_taken_for_a_shorter_cycle(tmp_path: Path) -> None:
+    path = tmp_path / "made.json"
+    path.write_text(omm_text(made()[::26]))
+    done = acu_daemon("groundtrack", "from-elements", path, "--json")
+    assert done.code == 0, done.err
+    assert json.loads(done.out)["cycle_revolutions"] == 373
+    assert "nothing is known from" in done.err
+
+
 @needs_data
 def test_the_mean_orbit_of_real_sets_is_that_of_their_published_cycles() -> None:
     sets, _ = parse_tle((DATA / "tle_sets" / "celestrak_resource_2026-05-30.txt").read_text(), "resource")

@@ -147,7 +147,6 @@ HEAD = (
 
 def as_object(outcome: Any) -> dict[str, Any]:
     """What `--json` writes of a run."""
-    from acu_daemon.groundtrack.environment import EPOCH_TAI_S
     from acu_daemon.orbit.timescales import utc_text
 
     case, flown = outcome.case, outcome.flown
@@ -165,7 +164,7 @@ def as_object(outcome: Any) -> dict[str, Any]:
         "d_max_m": round(float(flown.d_m.max()), 3),
         "bound_count": round(outcome.bound_count, 2),
         "manoeuvres": [
-            {"utc": utc_text(EPOCH_TAI_S + one.time_s), "delta_a_m": round(one.delta_a_m, 4)}
+            {"utc": utc_text(outcome.free.start_tai_s + one.time_s), "delta_a_m": round(one.delta_a_m, 4)}
             for one in flown.manoeuvres
         ],
     }
@@ -186,7 +185,7 @@ def as_row(outcome: Any) -> str:
 def with_tesserals(world: Any, *, is_wanted: bool) -> Any:
     """The world with the tables of the tesserals, computed now; a warning where it stays without."""
     from acu_daemon.edge.tesserals import ripple_of
-    from acu_daemon.groundtrack.environment import EPOCH_TAI_S, node_rad
+    from acu_daemon.groundtrack.environment import node_rad
 
     if not is_wanted:
         return world
@@ -198,17 +197,18 @@ def with_tesserals(world: Any, *, is_wanted: bool) -> Any:
         return world
     if sys.stderr.isatty():
         typer.echo("the tesserals' tables of the repeat cycle ...", err=True)
-    node = node_rad(world.craft, EPOCH_TAI_S)
-    tables = [ripple_of(world.craft.reference, EPOCH_TAI_S, node, degree) for degree in (TRUE_DEGREE, KNOWN_DEGREE)]
+    start_tai_s = world.start_tai_s
+    node = node_rad(world.craft, start_tai_s)
+    tables = [ripple_of(world.craft.reference, start_tai_s, node, degree) for degree in (TRUE_DEGREE, KNOWN_DEGREE)]
     return replace(world, ripple=tables[0], known_ripple=tables[1])
 
 
 def warn_of(world: Any, case: Any) -> None:
     """Say what in the profile the polynomials do not cover."""
-    from acu_daemon.groundtrack.environment import EPOCH_TAI_S, effective_flux, even_steps
+    from acu_daemon.groundtrack.environment import effective_flux, even_steps
     from acu_daemon.units import DAY_S
 
-    flux = effective_flux(world.flux.at(even_steps(EPOCH_TAI_S, DAY_S, int(case.days))))
+    flux = effective_flux(world.flux.at(even_steps(world.start_tai_s, DAY_S, int(case.days))))
     if count := world.polynomials.outside(flux):
         low, high = world.polynomials.lowest, world.polynomials.highest
         warn(

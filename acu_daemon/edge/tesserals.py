@@ -68,10 +68,10 @@ def ripple_of(reference: ReferenceOrbit, start_tai_s: float, node_rad: float, de
     base = mean_of(*without)
     moved = with_them[0] - without[0]
     seen = np.stack([np.sum(moved * axis, axis=1) for axis in axes_of(base)], axis=1)
-    return Ripple(RIPPLE_STEP_S, seen - _slow(seen, times_s / times_s[-1], base.alpha_rad, float(reference.e)))
+    return Ripple(RIPPLE_STEP_S, seen - _slow(seen, times_s / times_s[-1], base.alpha_rad))
 
 
-def _slow(seen_m: Array, share: Array, u: Array, _e: float) -> Array:
+def _slow(seen_m: Array, share: Array, u: Array) -> Array:
     """The part of radial, along, across (N, 3) that slowly changing elements make, by least squares."""
     one, c, s = np.ones_like(share), np.cos(u), np.sin(u)
     zero = np.zeros_like(share)

@@ -25,6 +25,7 @@ from acu_daemon.units import DAY_S, EARTH_EQUATORIAL_RADIUS_M, MU_M3_S2, Array
 LONGEST_CYCLE_DAYS = 45
 KEPT_WITHIN_M, _SHARE_OF_SPACING = 20_000.0, 0.25  # a satellite that is kept stays within +- this, and this share
 _EARTH_RATE_RAD_S = 2.0 * np.pi / DAY_S * (1.0 + 1.0 / 365.2421897)
+_PER_DAY = 1e-3  # of the revolutions a day: some 300 m of the semi-major axis
 _NODE_STEPS = 6
 _FARTHEST_A_M = 2_000.0  # of the mean orbit from that of its cycle; the elements' own bias is a few hundred
 LONGEST_GAP_DAYS = 15.0
@@ -82,12 +83,15 @@ def find_cycle(crossings: Sequence[Crossing], means: Sequence[MeanOrbit]) -> Cyc
     Raises:  UsageError: there is none: the satellite is not phased, or what is known of it is too little.
     """
     per_day = float(np.median([revolutions_per_day(one) for one in means]))
+    cycles = [Cycle(round(per_day * days), days) for days in range(1, LONGEST_CYCLE_DAYS + 1)]
+    candidates = [one for one in cycles if gcd(*one) == 1 and abs(one.per_day - per_day) < _PER_DAY]
+    if not candidates:
+        raise UsageError(
+            f"no repeat cycle of up to {LONGEST_CYCLE_DAYS} days fits: the satellite makes {per_day:.5f} revolutions a "
+            "day; if it is phased, name the cycle with --cycle REVOLUTIONS/DAYS"
+        )
     tried = []
-    for days in range(1, LONGEST_CYCLE_DAYS + 1):
-        revolutions = round(per_day * days)
-        if gcd(revolutions, days) != 1:
-            continue
-        cycle = Cycle(revolutions, days)
+    for cycle in candidates:
         d_m = unwound(cycle, crossings, _reference(cycle, means), means)
         range_m = float(np.max(d_m) - np.min(d_m)) / 2.0
         if range_m < min(KEPT_WITHIN_M, _SHARE_OF_SPACING * spacing_m(cycle)):

@@ -4,7 +4,7 @@ Time goes in blocks of fixes.  A block is observed as a whole; where the control
 after is thrown away and observed anew, on the orbit as the manoeuvre left it.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -119,9 +119,3 @@ def _decided(controller: Controller, block: Array, step: int) -> tuple[int, floa
         if size_m > 0.0:
             return k, size_m
     return block.size, 0.0
-
-
-def blocks(flown: Flown, hours: float) -> Iterator[tuple[float, float]]:
-    """Time in days and true D, thinned to one in so many hours, for a file or a picture."""
-    stride = max(1, round(hours * 3600.0 / STEP_S))
-    yield from zip((flown.times_s[::stride] / DAY_S).tolist(), flown.d_m[::stride].tolist(), strict=True)

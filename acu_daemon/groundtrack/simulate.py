@@ -92,6 +92,12 @@ class World:
     ripple: Ripple | None = None
     known_ripple: Ripple | None = None
 
+    @property
+    def start_tai_s(self) -> float:
+        """When a run begins: in 2010 where the flux covers it, as the package's own do, else with its first day."""
+        is_covered = self.flux.start_tai_s <= EPOCH_TAI_S < self.flux.end_tai_s
+        return EPOCH_TAI_S if is_covered else self.flux.start_tai_s
+
 
 class Outcome(NamedTuple):
     """A case and what came of it; `bound_count`: how few manoeuvres the whole band could do with."""
@@ -122,13 +128,14 @@ def simulate(world: World, case: Case, on_day: Callable[[float], None] | None = 
         world.craft,
         case.days,
         world.flux,
+        start_tai_s=world.start_tai_s,
         has_semi_annual=case.has_semi_annual,
         density_factor=_density_factor(case, of_density),
     )
-    node = node_rad(world.craft, EPOCH_TAI_S)
+    node = node_rad(world.craft, world.start_tai_s)
     flown = fly(
         TrueOrbit(free, node, world.ripple),
-        _navigator(case.navigator, NavigatorSetup(world.craft.reference, node, world.known_ripple)),
+        _navigator(case.navigator, NavigatorSetup(world.craft.reference, node, world.known_ripple, world.start_tai_s)),
         _controller(world, case),
         case.days,
         of_loop,
@@ -148,7 +155,7 @@ def check_case(world: World, case: Case) -> None:
         raise UsageError(f"--smoothing {case.smoothing}: expected {RECURSION} or {WINDOW}")
     if not 10.0 <= case.band_m <= 1e5:
         raise UsageError(f"--band-m {case.band_m:g}: expected half the band's width, 10 to 100000 m")
-    covered = (world.flux.end_tai_s - EPOCH_TAI_S) / DAY_S
+    covered = (world.flux.end_tai_s - world.start_tai_s) / DAY_S
     if not 1.0 <= case.days <= covered:
         raise UsageError(
             f"--days {case.days:g}: expected 1 to {covered:.0f}, the days the profile {case.profile} covers"
@@ -179,8 +186,8 @@ def _navigator(kind: str, setup: NavigatorSetup) -> OrbitNavigator | None:
 def _controller(world: World, case: Case) -> Controller:
     reference = world.craft.reference
     days = case.days + _FORECAST_SPARE_DAYS
-    sky = free_motion(world.craft, days, None).lunisolar_m_s2
-    tai_s = even_steps(EPOCH_TAI_S, STEP_S, sky.size)
+    sky = free_motion(world.craft, days, None, start_tai_s=world.start_tai_s).lunisolar_m_s2
+    tai_s = even_steps(world.start_tai_s, STEP_S, sky.size)
     coarse = tai_s[::20]
     drag = drag_forecast(world.craft, world.polynomials, coarse, world.flux, has_semi_annual=case.has_semi_annual)
     drag = np.interp(tai_s, coarse, drag)
