@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from functools import lru_cache
+from math import radians
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,12 @@ from conftest import DATA, needs_data
 from groundtrack_world import CRAFT, NODE_RAD, world
 from made_element_sets import element_set, noisy, omm_text
 
-from acu_daemon.groundtrack.environment import EPOCH_TAI_S, free_motion
+from acu_daemon.groundtrack.environment import EPOCH_TAI_S, Spacecraft, free_motion, node_rad
 from acu_daemon.groundtrack.gps import Steering, TrueOrbit
 from acu_daemon.groundtrack.history import mean_orbit_of, revolutions_per_day
-from acu_daemon.groundtrack.reference import Cycle
+from acu_daemon.groundtrack.reference import Cycle, ReferenceOrbit, phased, sun_synchronous
 from acu_daemon.orbit.element_set import ElementSet
-from acu_daemon.orbit.timescales import tai_from_utc
+from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 from acu_daemon.orbit.tle import parse_tle
 from acu_daemon.units import DAY_S
 
@@ -78,6 +79,27 @@ def test_without_manoeuvres_none_are_found(tmp_path: Path) -> None:
     rng = np.random.default_rng(2)
     quiet = [noisy(one, rng) for one in made()[13:42]]  # between two
     assert from_elements(tmp_path / "made.json", quiet)["manoeuvres"] == []
+
+
+@pytest.mark.parametrize(
+    ("reference", "ballistic_m2_kg", "day", "size_m"),
+    [
+        (sun_synchronous(Cycle(143, 10)), 0.012, 20.2, 28.0),  # as Sentinel-2
+        (phased(Cycle(127, 10), 1e-4, radians(66.04)), 0.02, 30.0, 8.0),  # as Jason: not sun-synchronous, little drag
+    ],
+)
+def test_other_phased_satellites_are_seen_with_their_cycle_and_manoeuvre(
+    tmp_path: Path, reference: ReferenceOrbit, ballistic_m2_kg: float, day: float, size_m: float
+) -> None:
+    craft = Spacecraft(reference, ballistic_m2_kg)
+    there = TrueOrbit(free_motion(craft, 51.0, world().flux), node_rad(craft, EPOCH_TAI_S))
+    steering = Steering(np.array([day * DAY_S]), np.array([size_m]))
+    sets = [element_set(there, steering, (k + 0.3) * DAY_S) for k in range(50)]
+    found = from_elements(tmp_path / "made.json", sets)
+    assert (found["cycle_revolutions"], found["cycle_days"]) == tuple(reference.cycle)
+    (only,) = found["manoeuvres"]  # type: ignore[misc]
+    assert only["delta_a_m"] == pytest.approx(size_m, abs=1.0)
+    assert only["utc"].startswith(utc_text(EPOCH_TAI_S + day * DAY_S)[:10])
 
 
 def test_a_table_and_files_are_written_for_people(tmp_path: Path) -> None:

@@ -14,12 +14,14 @@ from typing import NamedTuple
 import numpy as np
 
 from acu_daemon.errors import UsageError
+from acu_daemon.groundtrack.environment import even_steps, running_integral
+from acu_daemon.groundtrack.lunisolar import plane_rates
 from acu_daemon.groundtrack.reference import Cycle, ReferenceOrbit, phased
 from acu_daemon.model import EarthOrientation
 from acu_daemon.orbit.brouwer import secular_rates
 from acu_daemon.orbit.frames import itrs_from_teme
 from acu_daemon.orbit.propagator import Propagator
-from acu_daemon.orbit.timescales import utc_text
+from acu_daemon.orbit.timescales import gmst_rad, utc_text
 from acu_daemon.units import DAY_S, EARTH_EQUATORIAL_RADIUS_M, MU_M3_S2, Array
 
 LONGEST_CYCLE_DAYS = 45
@@ -29,6 +31,7 @@ _PER_DAY = 1e-3  # of the revolutions a day: some 300 m of the semi-major axis
 _NODE_STEPS = 6
 _FARTHEST_A_M = 2_000.0  # of the mean orbit from that of its cycle; the elements' own bias is a few hundred
 LONGEST_GAP_DAYS = 15.0
+_SKY_STEP_S = 3.0 * 3600.0
 _NO_ORIENTATION = EarthOrientation()
 
 
@@ -49,11 +52,15 @@ class MeanOrbit(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class History:
-    """D over time, (N,) each; `reference` tells what a step of the semi-major axis does."""
+    """D over time, (N,) each; `reference` tells what a step of the semi-major axis does.
+
+    sky_m: the part of D that Sun and Moon make, from rest at the first point.
+    """
 
     reference: ReferenceOrbit
     tai_s: Array
     d_m: Array
+    sky_m: Array
 
 
 def crossing_near(propagator: Propagator, tai_s: float, revolution_s: float) -> Crossing:
@@ -126,7 +133,8 @@ def history_of(
     _refuse_other_cycle(reference, means)
     d_m = unwound(chosen, crossings, reference, means)
     tai_s = np.array([one.tai_s for one in crossings])
-    return History(reference, tai_s, d_m - np.median(d_m)), _gaps(chosen, tai_s)
+    node_rad = float(gmst_rad(tai_s[:1], 0.0)[0]) + crossings[0].longitude_rad
+    return History(reference, tai_s, d_m - np.median(d_m), _sky_m(reference, tai_s, node_rad)), _gaps(chosen, tai_s)
 
 
 def unwound(
@@ -145,6 +153,17 @@ def unwound(
         seen = folded[k] - folded[0]
         d_m[k] = seen + spacing * round(float((expected - seen) / spacing))
     return d_m
+
+
+def _sky_m(reference: ReferenceOrbit, tai_s: Array, node_rad: float) -> Array:
+    """What Sun and Moon make of D since the first point, (N,), the node at `node_rad` there."""
+    times_s = even_steps(0.0, _SKY_STEP_S, int((tai_s[-1] - tai_s[0]) / _SKY_STEP_S) + 2)
+    node = node_rad + reference.raan_rate_rad_s * times_s
+    rates = plane_rates(tai_s[0] + times_s, reference.a_m, reference.i_rad, node)
+    tilt = running_integral(rates.inclination, _SKY_STEP_S)
+    drift = reference.drift_m(rates.raan, rates.alpha) + reference.by_i.drift * tilt
+    made: Array = np.interp(tai_s - tai_s[0], times_s, running_integral(drift, _SKY_STEP_S))
+    return made
 
 
 def _reference(cycle: Cycle, means: Sequence[MeanOrbit]) -> ReferenceOrbit:

@@ -40,8 +40,9 @@ def find_manoeuvres(history: History) -> list[FoundManoeuvre]:
 
     About each gap between two points a cubic (drag that changes steadily) with a kink is fitted to the points within
     the window, but no further than the kinks found already; the most significant one is taken, until none is left.
+    What Sun and Moon make of D, which bends within days, is taken out first.
     """
-    t, d = (history.tai_s - history.tai_s[0]) / DAY_S, history.d_m
+    t, d = (history.tai_s - history.tai_s[0]) / DAY_S, history.d_m - history.sky_m
     per_m = history.reference.drift_m_day_per_m
     noise_m = _noise_m(t, d)
     found: dict[int, _Kink] = {}

@@ -46,11 +46,12 @@ class Forecast:
 
 @dataclass(frozen=True, slots=True)
 class OurSettings:
-    """Control range; the execution error the sizes allow for."""
+    """Control range; the execution error the sizes allow for; 1 sigma of an hour's mean of D."""
 
     d_max_m: float
     d_min_m: float
     execution_sigma: float = EXECUTION_SIGMA
+    noise_m: float = NOISE_M
 
 
 class DriftFilter:
@@ -143,7 +144,7 @@ class OurController:
             return 0.0
         middle = step - OBSERVATIONS // 2
         self.filter.advance(self._at, middle)
-        self.filter.update(sum(self._waiting) / OBSERVATIONS, NOISE_M)
+        self.filter.update(sum(self._waiting) / OBSERVATIONS, self._settings.noise_m)
         self.filter.advance(middle, step)
         self._waiting, self._at = [], step
         return self._decide(step)

@@ -20,7 +20,7 @@ from acu_daemon.groundtrack.environment import (
 from acu_daemon.groundtrack.gps import Ripple, TrueOrbit
 from acu_daemon.groundtrack.loop import Controller, Flown, OrbitNavigator, fly
 from acu_daemon.groundtrack.navigator import Navigator, NavigatorSetup
-from acu_daemon.groundtrack.our_controller import FORECAST_S, Forecast, OurController, OurSettings
+from acu_daemon.groundtrack.our_controller import FORECAST_S, NOISE_M, Forecast, OurController, OurSettings
 from acu_daemon.groundtrack.paper_controller import ConstantController, PaperController, PaperSettings
 from acu_daemon.groundtrack.paper_navigator import PaperNavigator
 from acu_daemon.groundtrack.polynomials import DriftPolynomials, drag_forecast, fit_polynomials
@@ -30,6 +30,7 @@ from acu_daemon.units import DAY_S, Array
 PAPER, OURS, PERFECT, CONSTANT = "paper", "ours", "perfect", "constant"
 CONTROLLERS, NAVIGATORS = (OURS, PAPER, CONSTANT), (OURS, PAPER, PERFECT)
 SHAPE_DEGREE = 8  # of the logarithm's polynomial over fluxes from 0 on; the paper's degree is enough from 65 on
+PAPER_NAVIGATOR_NOISE_M = 150.0  # of an hour's mean of D: the tesserals that it does not know
 DENSITY_TIME_DAYS = 20.0  # how long a departure of the true density from the model lasts
 CONSTANT_WINDOW_S = 3.0 * 3600.0
 _FORECAST_SPARE_DAYS = FORECAST_S / DAY_S
@@ -192,9 +193,9 @@ def _controller(world: World, case: Case) -> Controller:
     drag = drag_forecast(world.craft, world.polynomials, coarse, world.flux, has_semi_annual=case.has_semi_annual)
     drag = np.interp(tai_s, coarse, drag)
     if case.controller == OURS:
-        return OurController(
-            OurSettings(case.band_m, -case.band_m, case.execution_sigma), reference, Forecast(STEP_S, drag, sky)
-        )
+        noise_m = PAPER_NAVIGATOR_NOISE_M if case.navigator == PAPER else NOISE_M
+        ours = OurSettings(case.band_m, -case.band_m, case.execution_sigma, noise_m)
+        return OurController(ours, reference, Forecast(STEP_S, drag, sky))
     windows = case.windows or paper_windows(case.profile, case.band_m)
     if case.controller == CONSTANT:
         return ConstantController(case.constant_m, reference, STEP_S, CONSTANT_WINDOW_S)
