@@ -30,6 +30,8 @@ from scipy.integrate import solve_ivp
 
 from acu_daemon.model import Station
 from acu_daemon.pointing.air import Air, refractivity, standard_air
+from acu_daemon.pointing.antenna_model import AntennaModel
+from acu_daemon.pointing.mount import Mount
 from acu_daemon.pointing.refraction import SCALE_HEIGHT_M, curvature_radius_m, traced
 from acu_daemon.units import DEG
 
@@ -99,11 +101,15 @@ def erfa_deg(apparent_el_deg: float, air: Air) -> float:
 def print_speed() -> None:
     """Microseconds of a call, the least of seven runs."""
     refraction = traced(320.0, Station("bench", LATITUDE_DEG, 0.0, 0.0))
+    model = AntennaModel(Mount(0.1, 0.05, 0.03, 0.02, 0.01, -0.02, 0.03), refraction)
     for count in (1000, 1):
-        el_deg, range_m = np.linspace(-2.0, 90.0, count), np.full(count, 1e6)
-        for way in (refraction.apparent_el_deg, refraction.geometric_el_deg):
-            least_s = min(timeit.repeat(partial(way, el_deg, range_m), number=50, repeat=7)) / 50
-            print(f"{way.__name__:>17} of {count:4d}: {1e6 * least_s:7.1f} us")
+        el_deg, range_m = np.linspace(2.0, 90.0, count), np.full(count, 1e6)
+        ways = [partial(way, el_deg, range_m) for way in (refraction.apparent_el_deg, refraction.geometric_el_deg)]
+        whole = (model.encoders_deg, model.geometric_deg, model.with_partials)
+        ways += [partial(way, 2.0 * el_deg, el_deg, range_m) for way in whole]
+        for way in ways:
+            least_s = min(timeit.repeat(way, number=20, repeat=7)) / 20
+            print(f"{way.func.__qualname__:>28} of {count:4d}: {1e6 * least_s:7.1f} us")
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -1,14 +1,16 @@
 """The system's leap-seconds.list: read, checked, compared with the built-in table, its expiry told."""
 
+from collections.abc import Iterator
 from datetime import date, timedelta
 from hashlib import sha1
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from acu_daemon.errors import EarthOrientationError
 from acu_daemon.orbit.leap_seconds import parse_leap_seconds
-from acu_daemon.orbit.timescales import LEAP_DATES, tai_from_utc
+from acu_daemon.orbit.timescales import LEAP_DATES, adopt_leap_dates, tai_from_utc, unix_from_tai, utc_days, utc_text
 
 SYSTEM = Path("/usr/share/zoneinfo/leap-seconds.list")
 MADE, EXPIRES = 3960835200, 3991593600  # 2025-07-07, 2026-06-28, seconds since 1900
@@ -42,6 +44,26 @@ def test_a_list_with_one_more_leap_second_is_newer() -> None:
     found = parse_leap_seconds(a_list((*LEAP_DATES, date(2029, 7, 1))), "leap-seconds.list")
     assert found.is_newer()
     assert found.dates[-1] == date(2029, 7, 1)
+
+
+@pytest.fixture
+def _built_in_afterwards() -> Iterator[None]:
+    yield
+    adopt_leap_dates(LEAP_DATES)
+
+
+@pytest.mark.usefixtures("_built_in_afterwards")
+def test_a_newer_list_that_is_adopted_moves_utc_from_its_leap_second_on() -> None:
+    before_s, after_s = tai_from_utc("2029-06-30T23:59:59Z"), tai_from_utc("2029-07-01T00:00:00Z")
+    days, fraction = utc_days(np.array([after_s]))
+    adopt_leap_dates(parse_leap_seconds(a_list((*LEAP_DATES, date(2029, 7, 1))), "leap-seconds.list").dates)
+    assert tai_from_utc("2029-06-30T23:59:59Z") == before_s
+    assert utc_text(before_s + 1.5, 1) == "2029-06-30T23:59:60.5Z"
+    assert tai_from_utc("2029-07-01T00:00:00Z") == after_s + 1.0
+    assert unix_from_tai(after_s + 1.0) == 1877558400.0  # 2029-07-01 as POSIX time
+    there, within = utc_days(np.array([after_s + 1.0]))
+    assert (float(there[0]), float(within[0])) == (float(days[0]), float(fraction[0]))
+    assert tai_from_utc("2016-12-31T23:59:60Z") == 536500836.0
 
 
 def test_the_numbers_are_those_of_the_published_file() -> None:

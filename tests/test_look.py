@@ -18,7 +18,7 @@ from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.orbit.tle import parse_tle
 from acu_daemon.units import EARTH_RATE_RAD_S, wrap_180_array
 
-SKYFIELD_DEG = 0.002
+SKYFIELD_DEG = 1e-4
 SKYFIELD_DEG_S = 1e-5
 DIFFERENCE_DEG_S = 2e-5  # SGP4's velocity is the derivative of its position to about 1e-6
 LIST = DATA / "tle_sets" / "celestrak_resource_2018-11-07.txt"

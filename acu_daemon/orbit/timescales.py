@@ -1,11 +1,12 @@
 """Time scales: TAI seconds since 2000-01-01T12:00:00 TAI against UTC, POSIX time, Julian days and sidereal time.
 
 UTC follows the leap seconds of IERS Bulletin C; the table ends with the leap second of 2016-12-31, the last one
-announced.  Before 1972 TAI-UTC is taken as 10 s.
+announced by 2026, and a newer one may be adopted.  Before 1972 TAI-UTC is taken as 10 s.
 """
 
 import re
 from bisect import bisect_right
+from collections.abc import Sequence
 from datetime import date, timedelta
 from math import pi
 
@@ -40,10 +41,24 @@ def _midnight_s(day: date) -> int:
     return (day.toordinal() - _J2000_ORDINAL) * _DAY_S - _DAY_S // 2
 
 
-_STEPS_UTC_S = [_midnight_s(day) for day in LEAP_DATES]
-_STEPS_TAI_S = [utc_s + 10 + i for i, utc_s in enumerate(_STEPS_UTC_S)]
-_STEPS_TAI_ARRAY = np.array(_STEPS_TAI_S, dtype=np.float64)
-_LEAP_SECONDS_TAI_S = frozenset(tai_s - 1 for tai_s in _STEPS_TAI_S[1:])
+def adopt_leap_dates(dates: Sequence[date]) -> None:
+    """Take these in place of LEAP_DATES, for all functions here: once, when a process starts, before any time is read.
+
+    dates: as LEAP_DATES, and the later ones that a leap-seconds.list has (acu_daemon.orbit.leap_seconds).  What a
+    process has read before would keep the old leap seconds, and each process adopts them for itself.
+    """
+    global _STEPS_UTC_S, _STEPS_TAI_S, _STEPS_TAI_ARRAY, _LEAP_SECONDS_TAI_S
+    _STEPS_UTC_S = [_midnight_s(day) for day in dates]
+    _STEPS_TAI_S = [utc_s + 10 + i for i, utc_s in enumerate(_STEPS_UTC_S)]
+    _STEPS_TAI_ARRAY = np.array(_STEPS_TAI_S, dtype=np.float64)
+    _LEAP_SECONDS_TAI_S = frozenset(tai_s - 1 for tai_s in _STEPS_TAI_S[1:])
+
+
+_STEPS_UTC_S: list[int]
+_STEPS_TAI_S: list[int]
+_STEPS_TAI_ARRAY: Array
+_LEAP_SECONDS_TAI_S: frozenset[int]
+adopt_leap_dates(LEAP_DATES)
 
 
 def _tai_minus_utc_s(utc_s: float) -> int:
