@@ -182,6 +182,15 @@ def test_rehearsal_and_simulation_stand_on_it(columns: int | None) -> None:
     assert "SIMULATION" not in live_text(SEEN)
 
 
+def test_where_it_points_stands_on_a_narrow_line_of_a_rehearsal_too_whatever_the_path_is_made_from() -> None:
+    for path in ("fit", "elements", "elements, moved to the signal", "last pass's fit"):
+        for is_on, word in ((True, "ON path 0.02 deg"), (False, "OFF path 0.02 deg")):
+            seen = replace(
+                HOLDING, state="HOLD/TLE", path=path, is_on_path=is_on, is_rehearsal=True, is_simulation=True
+            )
+            assert word in live_text(seen, columns=WIDTH)
+
+
 def test_without_a_link_no_angle_is_shown_as_if_it_were_measured() -> None:
     seen = replace(
         SEEN, is_link_up=False, state="LINK-LOST", link_problem="no answer", off_path_deg=None, reading_age_s=7.0

@@ -4,6 +4,7 @@ It fits the terminal's width.  What does not fit is left out as a whole, the lea
 in further lines.  Colours only repeat what words say.
 """
 
+import math
 import os
 import shutil
 import sys
@@ -36,8 +37,11 @@ def _lines(seen: Snapshot, beam_error_deg: float | None, columns: int | None) ->
     lines = [head.rstrip()] if columns is None else textwrap.wrap(head, columns) or [""]
     head_count = len(lines)
     last = lines[-1].ljust(VERDICT_WIDTH) if head_count == 1 else lines[-1]
+    room = math.inf if columns is None else columns
     for part in _parts(seen, beam_error_deg, is_short=columns is not None):
-        if part and (columns is None or len(last) + len(GAP) + len(part) <= columns):
+        if part == words.pointing(seen) and len(last) + len(GAP) + len(part) > room:
+            part = words.pointing(seen, is_short=True)
+        if part and len(last) + len(GAP) + len(part) <= room:
             last += GAP + part
     return head_count, [*lines[:-1], last.rstrip()]
 

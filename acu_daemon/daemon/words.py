@@ -47,13 +47,13 @@ def rise(seen: Snapshot) -> str:
     return f"at {seen.rise_utc[11:]} up to {seen.culmination_deg:.0f} deg {lasts}"
 
 
-def pointing(seen: Snapshot) -> str:
-    """Where the antenna points beside the path: ON within the half-power beam, else OFF."""
+def pointing(seen: Snapshot, *, is_short: bool = False) -> str:
+    """Where it points beside the path: ON within the half-power beam, else OFF; in short without the source."""
     if seen.off_path_deg is None:
         return ""
     if seen.state == TrackState.PREPOSITION:
         return f"{seen.off_path_deg:.1f} deg to go"
-    by = "" if seen.path == "fit" else f" of {seen.path.replace(' to the signal', '')}"
+    by = "" if is_short or seen.path == "fit" else f" of {seen.path.replace(' to the signal', '')}"
     return f"{'ON' if seen.is_on_path else 'OFF'} path{by} {seen.off_path_deg:4.2f} deg"
 
 
