@@ -7,7 +7,9 @@ What it does
   2. Prints, for apparent elevations at sea level and at 3 km, the refraction of acu_daemon.pointing.refraction and its
      difference from that, and beside it: the closed formula of ITU-R P.834, and the constants that ERFA's refco fits
      for radio waves, both for a source at infinity.
-  3. With --speed: microseconds for 1000 points and for one.
+  3. With --other-air: how far the model is from air of another profile (the simulator's), 8 % denser or thinner than
+     told, as it is and with the scale of the refraction fitted from a lowest elevation up.
+  4. With --speed: microseconds for 1000 points and for one.
 
 Takes 5 seconds.
 
@@ -15,6 +17,7 @@ Exit status: 0 all differences are within 0.002 deg below 5 deg of elevation and
 
 Examples
   scripts/refraction_figures.py                 the table of docs/antenna-model.md
+  scripts/refraction_figures.py --other-air     what a wrong profile and wrong weather cost
   scripts/refraction_figures.py --speed         and how long a call takes
 """
 
@@ -33,6 +36,7 @@ from acu_daemon.pointing.air import Air, refractivity, standard_air
 from acu_daemon.pointing.antenna_model import AntennaModel
 from acu_daemon.pointing.mount import Mount
 from acu_daemon.pointing.refraction import SCALE_HEIGHT_M, curvature_radius_m, traced
+from acu_daemon.sim.air import simulated_air
 from acu_daemon.units import DEG
 
 ELEVATIONS_DEG = (0.0, 1.0, 5.0, 10.0, 30.0)
@@ -98,6 +102,35 @@ def erfa_deg(apparent_el_deg: float, air: Air) -> float:
     return float((a * tangent + b * tangent**3) / DEG)
 
 
+OTHER_AIR = (
+    (0.0, Air(1013.0, 15.0, 60.0)),
+    (0.0, Air(1008.0, 30.0, 75.0)),
+    (0.0, Air(1020.0, -10.0, 60.0)),
+    (3000.0, Air(701.0, -3.0, 50.0)),
+)
+
+
+def print_other_air() -> None:
+    """Differences from Hopfield's air: worst from an elevation up, unscaled and with the scale fitted."""
+    print("\n  km   deg C  denser   from el  scale  worst unscaled   fitted  fitted above 10 deg")
+    for height_m, air in OTHER_AIR:
+        station = Station("figures", LATITUDE_DEG, 0.0, height_m)
+        refraction, radius_m = traced(refractivity(air), station), curvature_radius_m(station)
+        for denser in (0.92, 1.0, 1.08):
+            other = simulated_air(air.pressure_hpa, air.temperature_c, air.humidity_percent, height_m, denser)
+            for lowest_deg in (1.0, 3.0, 5.0):
+                el_deg = np.linspace(lowest_deg, 80.0, 300)
+                range_m = np.array([range_on_ray_m(el, height_m, radius_m) for el in el_deg])
+                there = np.array([other.apparent_el_deg(*pair) for pair in zip(el_deg, range_m, strict=True)])
+                ours, _, by_scale = refraction.apparent_with_slope(el_deg, range_m)
+                scale = 1.0 + float(by_scale @ (there - ours) / (by_scale @ by_scale))
+                left = np.abs(there - refraction.apparent_el_deg(el_deg, range_m, scale))
+                print(
+                    f"{height_m / 1e3:4.0f}  {air.temperature_c:6.0f}  {denser:6.2f}  {lowest_deg:8.0f}  {scale:5.3f}"
+                    f"  {np.abs(there - ours).max():14.4f}  {left.max():7.4f}  {left[el_deg > 10.0].max():19.5f}"
+                )
+
+
 def print_speed() -> None:
     """Microseconds of a call, the least of seven runs."""
     refraction = traced(320.0, Station("bench", LATITUDE_DEG, 0.0, 0.0))
@@ -115,6 +148,7 @@ def print_speed() -> None:
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--speed", action="store_true", help="time the calls as well")
+    parser.add_argument("--other-air", action="store_true", help="compare with the simulator's air as well")
     options = parser.parse_args(arguments)
     is_within = True
     print("  km      N  apparent  refraction  less integrated  inf less sat  P.834 N315 less ours  ERFA less ours, deg")
@@ -138,6 +172,8 @@ def main(arguments: list[str] | None = None) -> int:
                 f"{height_m / 1e3:4.0f}  {surface_n:5.1f}  {el_deg:8.0f}  {ours_deg:10.4f}"
                 f"  {ours_deg - theirs_deg:+15.1e}  {far_deg - ours_deg:12.4f}  {p834:+20.4f}  {by_erfa:>14}"
             )
+    if options.other_air:
+        print_other_air()
     if options.speed:
         print_speed()
     return 0 if is_within else 1
