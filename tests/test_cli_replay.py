@@ -2,6 +2,7 @@
 
 import csv
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from real_passes import RealPass, noisy, sky_angles_deg
 from acu_daemon.assist.estimator import ESTIMATORS
 from acu_daemon.control.states import TrackState
 from acu_daemon.edge.recording import RecordingWriter
+from acu_daemon.edge.recording_whose import ElementsUsed, Whose, save_whose
 from acu_daemon.model import Reading
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.units import DAY_S, Array
@@ -132,6 +134,44 @@ def test_all_estimators_are_compared_in_files_beside_the_named_one_a_table_and_a
     alone = tmp_path / "alone.csv"
     assert replay(config, readings, alone, "--estimator", "full").code == 0
     assert alone.read_bytes() == (tmp_path / "out-full.csv").read_bytes()
+
+
+@needs_data
+def test_the_readings_of_another_satellite_are_told_as_that_with_status_1(
+    tmp_path: Path, config: Path, real: RealPass
+) -> None:
+    readings, _ = recorded(tmp_path / "in.csv", real, step_s=5.0)
+    lines = (config / "satellites" / "sat.tle").read_text().splitlines()
+    first, second = lines[-2:]
+    node = f"{(float(second[17:25]) + 90.0) % 360.0:8.4f}"  # another plane
+    second = second[:17] + node + second[25:68]
+    digits = sum(int(one) if one.isdigit() else one == "-" for one in second)
+    (config / "satellites" / "sat.tle").write_text("\n".join([*lines[:-2], first, f"{second}{digits % 10}"]) + "\n")
+    done = replay(config, readings, tmp_path / "out.csv")
+    assert done.code == 1, done.err
+    assert "probably not this satellite, NORAD 41335: at their first lock" in done.err
+    assert len(rows_of(tmp_path / "out.csv")) == len(rows_of(readings))
+
+
+@needs_data
+def test_a_recording_that_says_it_is_of_another_satellite_is_told_as_that(
+    tmp_path: Path, config: Path, real: RealPass
+) -> None:
+    readings, _ = recorded(tmp_path / "in.csv", real, step_s=5.0)
+    used = ElementsUsed("tle", "2018-12-25T00:00:00Z")
+    mine = Whose(real.site.station, "SENTINEL-3A", None, used)
+    save_whose(readings, mine, "2018-12-25T01:40:00Z")
+    assert replay(config, readings, tmp_path / "out.csv").code == 0
+    (tmp_path / "in.csv.json").unlink()
+    save_whose(readings, replace(mine, satellite="NOAA-20"), "2018-12-25T01:40:00Z")
+    done = replay(config, readings, tmp_path / "out.csv")
+    assert done.code == 1
+    assert "probably not this satellite" in done.err
+    assert "in.csv is of NOAA-20 over" in done.err
+    (tmp_path / "in.csv.json").write_text("{")
+    done = replay(config, readings, tmp_path / "out.csv")
+    assert done.code == 0
+    assert "warning: whose the recording is cannot be read" in done.err
 
 
 @needs_data

@@ -10,13 +10,14 @@ from typing import Annotated
 import typer
 
 from acu_daemon.assist.estimator import ESTIMATORS
-from acu_daemon.cli.options import SPARE_S, Config, Satellite, Target, lacking, load_target
+from acu_daemon.cli.options import SPARE_S, Config, Satellite, Target, lacking, load_target, whose_recording
 from acu_daemon.cli.outputs import refuse_unwritable
 from acu_daemon.config import estimator_settings
-from acu_daemon.control.comparison import compare, what_is_left_out
+from acu_daemon.control.comparison import compare, what_is_left_out, why_not_this_satellite
 from acu_daemon.control.refit import RefitSetup
 from acu_daemon.control.replay import BUFFER_S, Replayed, replay
 from acu_daemon.edge.recording import read_readings
+from acu_daemon.edge.recording_whose import read_whose
 from acu_daemon.errors import UsageError
 from acu_daemon.model import Reading
 from acu_daemon.pointing.keyhole import longest_window_s
@@ -59,6 +60,9 @@ def command(
 
     Readings: any rate from 0.2 Hz up; `locked` is the raw flag, 0 or 1; angles may be empty where it is 0.  With
     --estimator all, readings without lock that have angles are what the predictions are compared with.
+
+    Exit status: 0; 1 the readings are probably not of this satellite (the files are written all the same), by the JSON
+    beside them or by what it takes to fit them; 2 wrong use or configuration.
     """
     names: list[str | None] = [*ESTIMATORS] if estimator == ALL else [estimator]
     paths = {name: _beside(out, name) if estimator == ALL else out for name in names}
@@ -88,9 +92,31 @@ def command(
         seconds[name] = time.perf_counter() - started_s
     if estimator == ALL:
         _compare(job, results, seconds, out.with_suffix(".png"))
-        return
-    (only,) = results.values()
-    typer.echo(f"readings left out of the fit: {what_is_left_out(only[-1].left_out)}", err=True)
+    else:
+        (only,) = results.values()
+        typer.echo(f"readings left out of the fit: {what_is_left_out(only[-1].left_out)}", err=True)
+    if reasons := [*_said_otherwise(readings, job.target), *_fitted_otherwise(job, results)]:
+        typer.echo(f"probably not this satellite, {job.target.elements.label}: {'; '.join(reasons)}", err=True)
+        raise typer.Exit(1)
+
+
+def _said_otherwise(readings: Path, target: Target) -> list[str]:
+    """That the recording says it is of another satellite or station, by the JSON beside it."""
+    try:
+        said = read_whose(readings)
+    except ValueError as error:
+        typer.echo(f"warning: whose the recording is cannot be read: {error}", err=True)
+        return []
+    asked = whose_recording(target, is_rehearsal=False)
+    if said is None or (said.is_of_satellite(asked) and said.is_at_station(asked)):
+        return []
+    return [f"{readings.name} is of {said}"]
+
+
+def _fitted_otherwise(job: _Job, results: dict[str, list[Replayed]]) -> list[str]:
+    best = results.get("full") or next(iter(results.values()))
+    reason = why_not_this_satellite(job.timed, best)
+    return [reason] if reason else []
 
 
 def _beside(out: Path, name: str | None) -> Path:

@@ -9,6 +9,11 @@ from acu_daemon.control.replay import Replayed
 from acu_daemon.model import FitResult, Reading, sky_angle_deg
 from acu_daemon.units import Array
 
+MOST_ALONG_S = 300.0
+MOST_ACROSS_DEG = 15.0
+MOST_OFF_DEG = 60.0
+LOWEST_DEG = -10.0
+
 
 @dataclass(frozen=True, slots=True)
 class Errors:
@@ -51,6 +56,25 @@ def compare(
         last_fit={name: one[-1].fit if one else None for name, one in results.items()},
         left_out={name: one[-1].left_out if one else {} for name, one in results.items()},
     )
+
+
+def why_not_this_satellite(lines: list[tuple[float, Reading | None]], results: list[Replayed]) -> str:
+    """Why the readings are probably not of the satellite whose elements they were replayed on; "": they may well be.
+
+    Elements that are weeks old are seconds late and a few degrees off; what needs minutes, or tens of degrees, to fit
+    is another satellite, however well it fits then.
+    """
+    fit = next((one.fit for one in reversed(results) if one.fit is not None), None)
+    if fit is not None and (abs(fit.along_s) > MOST_ALONG_S or abs(fit.across_deg) > MOST_ACROSS_DEG):
+        when = "late" if fit.along_s >= 0 else "early"
+        return f"to fit them it has to be {abs(fit.along_s):.0f} s {when} and {fit.across_deg:+.1f} deg across"
+    for (_, reading), one in zip(lines, results, strict=True):
+        if reading is not None and reading.is_locked and one.fit is None:
+            off_deg = sky_angle_deg(reading.az_deg, reading.el_deg, one.az_deg, one.el_deg)
+            if off_deg > MOST_OFF_DEG or one.el_deg < LOWEST_DEG:
+                return f"at their first lock the elements have it {off_deg:.0f} deg away, at elevation {one.el_deg:.0f}"
+            return ""
+    return ""
 
 
 def what_is_left_out(counts: dict[str, int]) -> str:
