@@ -14,6 +14,8 @@ from conftest import DATA, needs_data
 from real_passes import RealPass, noisy, sky_angles_deg
 
 from acu_daemon.assist.estimator import ESTIMATORS
+from acu_daemon.control.comparison import compare
+from acu_daemon.control.replay import Replayed
 from acu_daemon.control.states import TrackState
 from acu_daemon.edge.recording import RecordingWriter
 from acu_daemon.edge.recording_whose import ElementsUsed, Whose, save_whose
@@ -276,3 +278,16 @@ def test_wrong_use_ends_with_status_2_and_a_reason(tmp_path: Path, config: Path,
         assert done.code == 2, said
         assert said in done.err
     assert readings.read_bytes() == before
+
+
+def test_the_whole_pass_is_compared_with_its_losses_and_the_gaps_of_a_stopped_daemon() -> None:
+    lines: list[tuple[float, Reading | None]] = [
+        (float(t), Reading(float(t), 10.0, 20.0, is_locked=not 4 <= t < 8)) for t in range(12)
+    ]
+    lines += [(60.0 + t, Reading(60.0 + t, 10.0, 20.0, is_locked=True)) for t in range(3)]
+    results = [Replayed(10.0, 20.0, None, TrackState.AUTOTRACK_FITTED) for _ in lines]
+    seen = compare(lines, {"full": results}, 1.0)
+    assert seen.losses_tai_s == [(4.0, 8.0)]
+    assert seen.gaps_tai_s == [(11.0, 60.0)]
+    assert seen.errors["full"].tai_s.tolist() == [4.0, 5.0, 6.0, 7.0]
+    assert {1.0, 3.0, 10.0, 62.0} <= set(seen.tracked["full"].tai_s.tolist())

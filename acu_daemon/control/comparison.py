@@ -1,6 +1,7 @@
 """Estimators side by side on one recording: how far each one's predictions are from the readings.  Pure."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from acu_daemon.control.replay import Replayed
 from acu_daemon.model import FitResult, Reading, sky_angle_deg
 from acu_daemon.units import Array
 
+GAP_S = 6.0  # readings come at least every 5 s
 MOST_ALONG_S = 300.0
 MOST_ACROSS_DEG = 15.0
 MOST_OFF_DEG = 60.0
@@ -29,13 +31,17 @@ class Comparison:
 
     is_held_back: the compared readings are those without lock after the first one with, which no estimator has seen;
     else those with lock, each predicted from the ones up to a second before.  left_out: readings that no fit has seen,
-    by reason.
+    by reason.  tracked: the errors at the locked readings, whatever is compared.  losses_tai_s: spans without lock;
+    gaps_tai_s: spans without any line, as where the daemon was stopped.
     """
 
     is_held_back: bool
     errors: dict[str, Errors]
     last_fit: dict[str, FitResult | None]
     left_out: dict[str, dict[str, int]]
+    tracked: dict[str, Errors] = field(default_factory=dict)
+    losses_tai_s: list[tuple[float, float]] = field(default_factory=list)
+    gaps_tai_s: list[tuple[float, float]] = field(default_factory=list)
 
     @property
     def line_count(self) -> int:
@@ -50,7 +56,11 @@ def compare(
     begin = max(_first_fit(one) for one in results.values())
     is_held_back = any(k >= begin for k in held_back)
     chosen = [k for k in (held_back if is_held_back else locked) if k >= begin]
+    spans = _spans(lines)
     return Comparison(
+        tracked={name: _errors(lines, one, [k for k in locked if k >= begin]) for name, one in results.items()},
+        losses_tai_s=spans[0],
+        gaps_tai_s=spans[1],
         is_held_back=is_held_back,
         errors={name: _errors(lines, one, chosen) for name, one in results.items()},
         last_fit={name: one[-1].fit if one else None for name, one in results.items()},
@@ -95,6 +105,19 @@ def _kinds(lines: list[tuple[float, Reading | None]], lock_dwell_s: float) -> tu
         elif locked and not reading.is_locked:
             held_back.append(k)
     return held_back, locked
+
+
+def _spans(lines: list[tuple[float, Reading | None]]) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
+    """Spans without lock, and spans without lines."""
+    losses: list[tuple[float, float]] = []
+    gaps = []
+    for (before_s, before), (tai_s, _) in pairwise(lines):
+        if tai_s - before_s > GAP_S:
+            gaps.append((before_s, tai_s))
+        elif before is None or not before.is_locked:
+            is_same = bool(losses) and losses[-1][1] == before_s
+            losses[-1 if is_same else len(losses) :] = [(losses[-1][0] if is_same else before_s, tai_s)]
+    return losses, gaps
 
 
 def _first_fit(results: list[Replayed]) -> int:

@@ -1,13 +1,16 @@
 """Estimators side by side on one recording, as a table for people and a picture."""
 
+from datetime import datetime
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.dates import DateFormatter, date2num
 from matplotlib.figure import Figure
 
-from acu_daemon.control.comparison import Comparison, what_is_left_out
+from acu_daemon.control.comparison import Comparison, Errors, what_is_left_out
 from acu_daemon.model import FitResult
+from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.units import Array
 
 FLOOR_DEG = 1e-4  # of the logarithmic scale
@@ -57,20 +60,41 @@ def plot(path: Path, seen: Comparison, title: str) -> None:
     mpl.rcParams.update({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False})
     figure = Figure(figsize=(10.0, 5.0), dpi=120, layout="constrained")
     axes = figure.add_subplot()
-    starts = [float(errors.tai_s[0]) for errors in seen.errors.values() if errors.tai_s.size]
+    for spans, shade, label in (
+        (seen.losses_tai_s, "#f3e3c3", "no signal"),
+        (seen.gaps_tai_s, "#dddddd", "no readings: the daemon was stopped"),
+    ):
+        for k, span in enumerate(spans):
+            begin, end = map(_date, span)
+            axes.axvspan(begin, end, color=shade, label=label if k == 0 else None, zorder=0)
+    has_any = False
     for colour, (name, errors) in zip(_COLOURS, seen.errors.items(), strict=False):
-        if errors.tai_s.size:
-            time_s, error_deg = errors.tai_s - min(starts), np.maximum(errors.error_deg, FLOOR_DEG)
-            axes.semilogy(time_s, error_deg, ".", markersize=2.5, alpha=0.25, color=colour, markeredgewidth=0.0)
-            axes.semilogy(*_medians(time_s, error_deg), linewidth=1.6, color=colour, label=name)
+        parts: list[tuple[Errors, str | None]] = [(errors, name)]
+        if seen.is_held_back:
+            parts.append((seen.tracked[name], None))
+        for part, shown in parts:
+            if not part.tai_s.size:
+                continue
+            has_any = True
+            error_deg = np.maximum(part.error_deg, FLOOR_DEG)
+            dates = [_date(tai_s) for tai_s in part.tai_s.tolist()]
+            axes.semilogy(dates, error_deg, ".", markersize=2.5, alpha=0.25, color=colour, markeredgewidth=0.0)
+            times, medians = _medians(part.tai_s, error_deg)
+            axes.semilogy([_date(one) for one in times], medians, linewidth=1.6, color=colour, label=shown)
     figure.suptitle(title, fontsize=12, fontweight="bold")
     axes.set_title(what_is_compared(seen), fontsize=9)
-    axes.set_xlabel("seconds")
+    axes.xaxis.set_major_formatter(DateFormatter("%H:%M:%S"))  # type: ignore[no-untyped-call]
+    axes.set_xlabel("UTC")
     axes.set_ylabel("prediction against reading, deg on the sky")
     axes.grid(alpha=0.3, which="major")
-    if starts:
-        axes.legend(frameon=False, ncols=3, title="medians of short spans")
+    if has_any:
+        figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", frameon=False, ncols=7)
     figure.savefig(path, format="png")
+
+
+def _date(tai_s: float) -> float:
+    """Days, as the axis counts them; a leap second has no place there."""
+    return float(date2num(datetime.fromisoformat(utc_text(tai_s, 6).replace(":60", ":59"))))  # type: ignore[no-untyped-call]
 
 
 def _medians(time_s: Array, error_deg: Array) -> tuple[list[float], list[float]]:
