@@ -83,6 +83,7 @@ def plot(path: Path, seen: Comparison, title: str) -> None:
             axes.semilogy([_date(one) for one in times], medians, linewidth=1.6, color=colour, label=shown)
     figure.suptitle(title, fontsize=12, fontweight="bold")
     axes.set_title(what_is_compared(seen), fontsize=9)
+    axes.xaxis_date()  # round times at the ticks
     axes.xaxis.set_major_formatter(DateFormatter("%H:%M:%S"))  # type: ignore[no-untyped-call]
     axes.set_xlabel("UTC")
     axes.set_ylabel("prediction against reading, deg on the sky")
