@@ -6,6 +6,7 @@ from math import degrees, radians
 import numpy as np
 import pytest
 from groundtrack_world import CRAFT, NODE_RAD, node_and_alpha, start_state
+from script_modules import load
 
 from acu_daemon.edge.tesserals import Forces, integrate, ripple_of
 from acu_daemon.errors import UsageError
@@ -147,3 +148,11 @@ def test_polynomials_of_the_logarithm_are_far_nearer_than_those_of_the_accelerat
     runs = constant_runs(CRAFT, flux, 3.0)
     assert polynomials.acceleration_m_s2(flux, np.full(3, 3.0)) == pytest.approx(runs, rel=0.05)
     assert polynomials.outside(np.array([60.0, 100.0, 301.0])) == 2
+
+
+@needs_brahe
+def test_the_script_of_the_figures_says_how_near_the_reference_orbit_is(capsys: pytest.CaptureFixture[str]) -> None:
+    load("groundtrack_figures").reference()
+    said = capsys.readouterr().err
+    assert "of INPE's" in said
+    assert "brahe, zonals to 4: node rate +2.9e-05 relative" in said
