@@ -1,6 +1,11 @@
 """`groundtrack simulate` and `reproduce`: what they write, and what they say to wrong use."""
 
+import contextlib
 import json
+import os
+import pty
+import subprocess
+import sys
 from datetime import date, timedelta
 from pathlib import Path
 
@@ -69,6 +74,24 @@ def test_the_table_of_the_paper_stands_beside_ours(tmp_path: Path) -> None:
         assert text in done.out
     names = sorted(path.name for path in (tmp_path / "out").iterdir())
     assert names == [f"figure-{name}.png" for name in ("02", "03", "04-05", "06", "07", "08-09", "10", "11")]
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("runs", [1, 2])
+def test_on_a_terminal_the_command_draws_its_bar(runs: int) -> None:
+    ours, theirs = pty.openpty()
+    command = [sys.executable, "-m", "acu_daemon", "groundtrack", "simulate", *map(str, QUICK), "--runs", str(runs)]
+    with subprocess.Popen([*command, "--jobs", "1"], stdout=subprocess.PIPE, stderr=theirs, text=True) as process:
+        os.close(theirs)
+        drawn = b""
+        with contextlib.suppress(OSError):  # which ends what a pseudo terminal gives
+            while got := os.read(ours, 4096):
+                drawn += got
+        assert process.stdout is not None
+        assert process.stdout.read().startswith("SIMULATION")
+    os.close(ours)
+    assert process.returncode == 0
+    assert ("SIMULATION, runs" if runs > 1 else "SIMULATION, days") in drawn.decode()
 
 
 @pytest.mark.parametrize("name", PROFILES)

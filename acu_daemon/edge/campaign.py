@@ -81,6 +81,8 @@ def progress_bar(what: str) -> Iterator[OnDone | None]:
     if not sys.stderr.isatty():
         yield None
         return
+    if sys.modules.get("rich", sys) is None:
+        del sys.modules["rich"]  # the start keeps it out of commands that need none
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
