@@ -17,7 +17,7 @@ from acu_daemon.assist.settings import StateSigmas
 from acu_daemon.config_problems import in_words
 from acu_daemon.config_tables import SatelliteFile, Section, StationFile, UncertaintySection
 from acu_daemon.control.axis_watch import Bounds
-from acu_daemon.control.state import ControlConfig
+from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.errors import ConfigError
 
 HALF_SERVO_TICK_S = 0.010  # ICD section 6: a command waits for half a 50 Hz servo tick on average

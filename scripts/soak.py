@@ -164,10 +164,10 @@ class Soak:
             if kill_s is not None and since_rise_s >= kill_s and not rig.outcomes:
                 kill_s, seen.is_killed = None, True
                 rig.crash(0.5)
-            is_wrong = bool(state.latch) or bool(state.disarmed_by)
+            is_wrong = bool(state.latch.problem) or bool(state.arming.disarmed_by)
             is_over = all(end_s + 1.0 < since_rise_s or begin_s > since_rise_s for begin_s, end_s in plan.disturbed())
             if is_wrong and is_over and not rig.outcomes:
-                seen.latches.append(state.latch or state.disarmed_by)
+                seen.latches.append(state.latch.problem or state.arming.disarmed_by)
                 rig.ask("clear")
                 rig.ask("arm")
                 watch.mended(since_rise_s)

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from acu_daemon.control.state import ControlConfig, Exchange, Observation, PassPlan, Sky
+from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Sky
 from acu_daemon.model import AxisLimits, FitResult, Prediction, Reading
 from acu_daemon.protocol.messages import Registers, Status, WriteAndPoll, WriteRegisters
 

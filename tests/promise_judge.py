@@ -90,7 +90,7 @@ class Judge:
     def asked(self, line: str) -> None:
         """What a person asks for; the next tick does it."""
         state = self._rig.state
-        if line == "clear" and (state.latch or self.is_latched):
+        if line == "clear" and (state.latch.problem or self.is_latched):
             self.is_latched = self._is_present = self._is_read_back = False
             self._is_clearing = True
         if line == "arm" and not state.is_armed(self._rig.config):
@@ -132,7 +132,7 @@ class Judge:
     def _judge_order(self, command: Any) -> None:
         state, name = self._rig.state, type(command).__name__
         self.order_count += 1
-        self.is_latched |= bool(state.latch)
+        self.is_latched |= bool(state.latch.problem)
         if self.is_latched:
             self._break("P6", f"{name} while latched")
         if self.is_disarmed or not state.is_armed(self._rig.config):
@@ -172,7 +172,7 @@ class Judge:
     def _judge_rate(self, az_deg: float, el_deg: float) -> None:
         """Between two writes that the antenna follows, as the daemon knows."""
         rig, before = self._rig, self._followed
-        status = rig.state.status
+        status = rig.state.intake.status
         is_followed = status is not None and status.follows_registers and rig.acu.follows_registers
         self._followed = (self._now_s, az_deg, el_deg) if is_followed else None
         if before is None or self._followed is None:
@@ -188,9 +188,10 @@ class Judge:
     def _judge_path(self, az_deg: float, el_deg: float) -> None:
         """With a fit of good readings, what is not held back is on the satellite."""
         rig, state = self._rig, self._rig.state
-        is_held_back = state.gate_clamped_count != self._clamped_count or bool(state.refusal)
-        self._clamped_count = state.gate_clamped_count
-        is_on_path = state.track == "AUTOTRACK/FITTED" or (state.track == "HOLD/FITTED" and state.was_followed)
+        is_held_back = state.refusals.clamped_count != self._clamped_count or bool(state.refusals.refusal)
+        self._clamped_count = state.refusals.clamped_count
+        track, was_followed = state.tracking.track, state.registers.was_followed
+        is_on_path = track == "AUTOTRACK/FITTED" or (track == "HOLD/FITTED" and was_followed)
         if self.is_spoiled or is_held_back or not is_on_path:
             return
         truth = rig.acu.parts.sky.direction(rig.clock.tai_s() + 0.02)
@@ -198,7 +199,7 @@ class Judge:
             return
         error_deg = sky_angle_deg(az_deg, el_deg, truth[0], truth[1])
         if error_deg > PATH_DEG:
-            self._break("P7", f"{error_deg:.2f} deg beside the satellite in {state.track}")
+            self._break("P7", f"{error_deg:.2f} deg beside the satellite in {state.tracking.track}")
 
     def applied(self, write: RegisterWrite) -> None:
         """The ACU takes a register write: what was sent long ago must not arrive."""
@@ -242,7 +243,7 @@ class Judge:
         foreground = self._rig.service._foreground
         ticks, skipped = foreground.tick_count, foreground.skipped_tick_count
         ticked_s = self._now_s - self._started_s
-        if self._rig.state.status is None:
+        if self._rig.state.intake.status is None:
             ticked_s = min(ticked_s, FIRST_POLL_S)  # without an ACU it ends then; what it owes is a stop, no ticks
         due = ticked_s / self._rig.config.period_s
         is_calm = self._now_s - self._stalled_s > 0.5

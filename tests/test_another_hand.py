@@ -29,7 +29,7 @@ def rig(tmp_path: Path) -> Iterator[Rig]:
         made.wait(LOCK_S)
         made.fault("silence")
         made.wait(2.0)
-        assert made.state.track == "HOLD/FITTED"
+        assert made.state.tracking.track == "HOLD/FITTED"
         yield made
         assert not made.judge.broken, made.judge.broken
 
@@ -69,20 +69,20 @@ def test_p1_a_stop_in_an_outage_is_respected_until_a_person_arms(
     meanwhile(rig, what)
     outage(rig)
     rig.wait(3.0)
-    assert (rig.state.is_armed(rig.config), rig.state.disarmed_by) == (False, BY_HAND)
+    assert (rig.state.is_armed(rig.config), rig.state.arming.disarmed_by) == (False, BY_HAND)
     orders = rig.judge.order_count
     rig.wait(3.0)
     assert rig.judge.order_count == orders
     rig.ask("arm")
     rig.wait(3.0)
-    assert rig.state.track == "HOLD/FITTED"
+    assert rig.state.tracking.track == "HOLD/FITTED"
 
 
 def test_p1_a_stop_while_the_daemon_hangs_is_respected(rig: Rig) -> None:
     rig.hand("stop")
     rig.skip(2.0)
     rig.wait(3.0)
-    assert rig.state.disarmed_by == BY_HAND
+    assert rig.state.arming.disarmed_by == BY_HAND
 
 
 @pytest.mark.parametrize("outage", OUTAGES)
@@ -92,7 +92,7 @@ def test_p1_a_takeover_by_the_panel_that_is_over_when_the_outage_is_counts_as_a_
     rig.fault("local-panel start_s=1 duration_s=1")
     outage(rig)
     rig.wait(3.0)
-    assert rig.state.disarmed_by == BY_HAND
+    assert rig.state.arming.disarmed_by == BY_HAND
 
 
 @pytest.mark.parametrize("outage", OUTAGES)
@@ -100,7 +100,7 @@ def test_p1_an_emergency_stop_that_is_reset_within_an_outage_disarms(rig: Rig, o
     rig.fault("emergency-stop start_s=1 duration_s=1")
     outage(rig)
     rig.wait(3.0)
-    assert rig.state.disarmed_by == BY_HAND
+    assert rig.state.arming.disarmed_by == BY_HAND
 
 
 @pytest.mark.parametrize("outage", OUTAGES)
@@ -108,10 +108,10 @@ def test_p1_a_stow_in_an_outage_is_kept_through_another_crash(rig: Rig, outage: 
     meanwhile(rig, "stow")
     outage(rig)
     rig.wait(30.0)
-    assert rig.state.track == "STOW"
+    assert rig.state.tracking.track == "STOW"
     rig.crash(0.0)
     rig.wait(5.0)
-    assert rig.state.track == "STOW"
+    assert rig.state.tracking.track == "STOW"
 
 
 @pytest.mark.parametrize("outage", OUTAGES)
@@ -120,7 +120,7 @@ def test_p4_after_an_outage_in_which_nobody_did_anything_it_holds_again(
 ) -> None:
     outage(rig)
     rig.wait(3.0)
-    assert rig.state.track == "HOLD/FITTED"
+    assert rig.state.tracking.track == "HOLD/FITTED"
 
 
 def trip_by_crash(rig: Rig) -> None:
@@ -140,7 +140,7 @@ def test_p4_after_the_register_watchdog_has_tripped_it_holds_again_within_three_
         trip(rig)
         rig.wait(3.0)
         assert rig.acu.status().has_interlock_fault
-        assert (rig.state.disarmed_by, rig.state.track) == ("", "HOLD/FITTED")
+        assert (rig.state.arming.disarmed_by, rig.state.tracking.track) == ("", "HOLD/FITTED")
 
 
 @pytest.fixture
@@ -162,7 +162,7 @@ def test_p4_a_watchdog_that_shows_in_the_fault_detail_alone_is_nobodys_stop(
         trip(rig)
         rig.wait(3.0)
         assert not rig.acu.status().has_interlock_fault
-        assert (rig.state.disarmed_by, rig.state.track) == ("", "HOLD/FITTED")
+        assert (rig.state.arming.disarmed_by, rig.state.tracking.track) == ("", "HOLD/FITTED")
 
 
 @pytest.mark.usefixtures("status_without_system_faults")
@@ -173,7 +173,7 @@ def test_p1_a_stop_in_a_long_outage_is_respected_once_the_fault_detail_shows_no_
     meanwhile(rig, "stop")
     trip(rig)
     rig.wait(3.0)
-    assert rig.state.disarmed_by == BY_HAND
+    assert rig.state.arming.disarmed_by == BY_HAND
 
 
 def test_p1_with_the_watchdogs_bit_still_standing_a_stop_in_a_short_outage_is_respected(rig: Rig) -> None:
@@ -182,21 +182,21 @@ def test_p1_with_the_watchdogs_bit_still_standing_a_stop_in_a_short_outage_is_re
     meanwhile(rig, "stop")
     cut(rig)
     rig.wait(3.0)
-    assert rig.state.disarmed_by == BY_HAND
+    assert rig.state.arming.disarmed_by == BY_HAND
 
 
 def test_p4_our_own_stop_at_the_end_is_nobody_elses(rig: Rig) -> None:
     rig.end_and_run_again()
     rig.wait(10.0)
-    assert rig.state.disarmed_by == ""
-    assert rig.state.track in ("HOLD/FITTED", "PREPOSITION")
+    assert rig.state.arming.disarmed_by == ""
+    assert rig.state.tracking.track in ("HOLD/FITTED", "PREPOSITION")
 
 
 def test_p4_a_power_cycle_in_an_outage_is_nobodys_stop(rig: Rig) -> None:
     rig.fault("power-cycle start_s=1 duration_s=1")
     dead(rig)
     rig.wait(3.0)
-    assert rig.state.disarmed_by == ""
+    assert rig.state.arming.disarmed_by == ""
 
 
 # A disarm is as durable as a latch
@@ -210,7 +210,7 @@ def test_p1_a_disarm_outlives_a_crash_and_a_run_state_that_is_torn_or_gone(rig: 
     run_state.unlink() if damage is None else run_state.write_bytes(damage)
     rig.crash(0.0)
     rig.wait(5.0)
-    assert (rig.state.is_armed(rig.config), rig.state.disarmed_by) == (False, "a person")
+    assert (rig.state.is_armed(rig.config), rig.state.arming.disarmed_by) == (False, "a person")
     rig.ask("arm")
     rig.wait(1.0)
     assert not (rig.directory / DISARMED).exists()

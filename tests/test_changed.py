@@ -7,9 +7,10 @@ import pytest
 
 from acu_daemon.control.axis_watch import AxisWatch
 from acu_daemon.control.changed import changed
-from acu_daemon.control.state import ControlState, Observation
+from acu_daemon.control.state import ControlState, Latch
+from acu_daemon.control.tick_input import Observation
 
-MEMORIES = (ControlState(az_deg=12.0, latch="azimuth"), Observation(silence_s=0.3), AxisWatch(side=1))
+MEMORIES = (ControlState(latch=Latch("azimuth")), Observation(silence_s=0.3), AxisWatch(side=1))
 
 
 @pytest.mark.parametrize("before", MEMORIES, ids=lambda one: type(one).__name__)

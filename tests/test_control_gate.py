@@ -6,10 +6,12 @@ from math import inf, nan
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from memories import remembering
 
-from acu_daemon.control.absorb import RATE_READINGS
+from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.gate import gate
-from acu_daemon.control.state import ControlConfig, ControlState
+from acu_daemon.control.intake import RATE_READINGS
+from acu_daemon.control.state import ControlState
 from acu_daemon.model import AxisLimits, Pointing
 from acu_daemon.pointing.axis import AxisState
 from acu_daemon.protocol.messages import AcuMode, Status
@@ -23,7 +25,7 @@ any_angle = st.floats(allow_nan=True, allow_infinity=True) | st.floats(-400, 400
 
 
 def at(az_deg: float, el_deg: float, az_rate: float = 0.0, el_rate: float = 0.0) -> ControlState:
-    return ControlState(
+    return remembering(
         status=Status(az_deg % 360.0, el_deg, AcuMode.REMOTE),
         az_deg=az_deg,
         axis_az=AxisState(az_deg, az_rate),
@@ -46,10 +48,10 @@ def test_p5_followed_registers_never_move_faster_than_the_axis(az, el, targets):
     state = at(az, el)
     for target_az, target_el in targets:
         passed = gate(Pointing(target_az, target_el, 0.0, 0.0), state, 0.0, is_followed=True, dt_s=DT_S, config=CONFIG)
-        before_az, before_el = state.axis_az.position_deg, state.axis_el.position_deg
+        before_az, before_el = state.registers.axis_az.position_deg, state.registers.axis_el.position_deg
         assert abs(passed.az.position_deg - before_az) <= 20.0 * DT_S + RATE_TOLERANCE_DEG
         assert abs(passed.el.position_deg - before_el) <= 5.0 * DT_S + RATE_TOLERANCE_DEG
-        state = replace(at(passed.az.position_deg, passed.el.position_deg), axis_az=passed.az, axis_el=passed.el)
+        state = remembering(at(passed.az.position_deg, passed.el.position_deg), axis_az=passed.az, axis_el=passed.el)
 
 
 def test_registers_that_are_not_followed_hold_the_true_path_at_any_speed():
@@ -92,7 +94,7 @@ def test_p5_a_followed_register_that_stood_through_a_refusal_begins_again_from_a
     state = at(100.0, 45.0, az_rate=5.0, el_rate=3.0)
     passed = gate(Pointing(nan, 45.3, 5.0, 3.0), state, 0.0, is_followed=True, dt_s=DT_S, config=CONFIG)
     assert (passed.az.rate_deg_s, passed.el.rate_deg_s) == (0.0, 0.0)
-    state = replace(state, axis_az=passed.az, axis_el=passed.el)
+    state = remembering(state, axis_az=passed.az, axis_el=passed.el)
     passed = gate(Pointing(100.5, 45.6, 5.0, 3.0), state, 0.0, is_followed=True, dt_s=DT_S, config=CONFIG)
     assert passed.el.rate_deg_s <= 5.0 * DT_S
 
@@ -104,7 +106,7 @@ def test_a_hair_below_the_horizon_is_sent_as_the_limit_not_as_359_999():
 
 
 def test_an_antenna_far_from_the_register_it_begins_to_follow_starts_from_where_it_is():
-    state = replace(at(100.0, 80.0), axis_az=AxisState(200.0), was_followed=False)
+    state = remembering(at(100.0, 80.0), axis_az=AxisState(200.0), was_followed=False)
     passed = gate(Pointing(200.0, 80.0, 0.0, 0.0), state, 0.0, is_followed=True, dt_s=DT_S, config=CONFIG)
     assert abs(passed.az.position_deg - 100.0) < 1.0
 
@@ -125,7 +127,7 @@ def test_registers_that_begin_beside_a_moving_path_come_onto_it_and_not_only_to_
     for tick in range(1, 1 + round(CHASE_S / DT_S)):
         path = Pointing(103.0 + rate_deg_s * DT_S * tick, el_deg, rate_deg_s, 0.0)
         passed = gate(path, state, 0.0, is_followed=True, dt_s=DT_S, config=CONFIG)
-        state = replace(at(passed.az.position_deg, passed.el.position_deg), axis_az=passed.az, axis_el=passed.el)
+        state = remembering(at(passed.az.position_deg, passed.el.position_deg), axis_az=passed.az, axis_el=passed.el)
     assert passed.az.position_deg == pytest.approx(path.az_deg, abs=RATE_TOLERANCE_DEG)
 
 
@@ -134,7 +136,7 @@ def test_the_antennas_own_rate_is_known_at_every_period(period_s: float) -> None
     """An antenna that comes at 10 deg/s to a register that it is about to follow is met where it will be."""
     readings = tuple((period_s * k, 100.0 + 10.0 * period_s * k, 45.0) for k in range(RATE_READINGS))
     now_s = readings[-1][0] + period_s
-    state = replace(at(readings[-1][1], 45.0), axis_az=None, axis_el=None, track_of_readings=readings)
+    state = remembering(at(readings[-1][1], 45.0), axis_az=None, axis_el=None, track_of_readings=readings)
     here = Pointing(100.0 + 10.0 * now_s, 45.0, 0.0, 0.0)
     passed = gate(here, state, now_s, is_followed=True, dt_s=period_s, config=CONFIG)
     assert passed.az.position_deg == pytest.approx(here.az_deg, abs=RATE_TOLERANCE_DEG)

@@ -21,8 +21,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acu_daemon.cli.virtual_pass import Flight
+from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.search import boxes, covered_text, go_on, is_done, look, needed_s, pace_s_s, place, pointing
-from acu_daemon.control.state import ControlConfig, Scan
+from acu_daemon.control.state import Scan
 from acu_daemon.control.track_frame import extents
 from acu_daemon.model import AxisLimits, Model, Pointing, Prediction, Reading
 from acu_daemon.sim.scenario import SkyErrors

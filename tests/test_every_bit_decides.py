@@ -4,12 +4,15 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from memories import remembering
 from test_tick import AZ_DEG, CONFIG, EL_DEG, NOW, PLAN, SKY, path, ready, saw, status
 
 from acu_daemon.control.doubt import contradictions
-from acu_daemon.control.state import ControlState, Exchange, Held, Observation, Orders, Sky
+from acu_daemon.control.orders import Orders
+from acu_daemon.control.state import ControlState, Held
 from acu_daemon.control.states import TrackState
 from acu_daemon.control.tick import tick
+from acu_daemon.control.tick_input import Exchange, Observation, Sky
 from acu_daemon.model import AxisLimits, Prediction, Reading
 from acu_daemon.protocol.messages import AcuMode, Backup, Faults, ReadFaults, Status
 
@@ -46,12 +49,12 @@ def test_an_axis_that_stands_is_excused_by_the_switch_on_its_commands_side_and_b
     switch: str | None, side: str
 ) -> None:
     seen = status(AcuMode.REMOTE_BACKUP, **({switch: True} if switch else {}))
-    before = replace(ready(TrackState.HOLD_FITTED, seen), hold_from_tai_s=NOW)
+    before = remembering(ready(TrackState.HOLD_FITTED, seen), hold_from_tai_s=NOW)
     right, up = SIDES[side]
     state, _ = ticks(before, [seen] * 60, standing(6.0 * right, 6.0 * up))
     name = "azimuth" if right else "elevation"
     excused = switch is not None and ENDS[switch] == SIDES[side]
-    assert state.latch == ("" if excused else f"{name} stands still away from its command")
+    assert state.latch.problem == ("" if excused else f"{name} stands still away from its command")
 
 
 @pytest.mark.parametrize("switch", [*ENDS, None])
@@ -87,15 +90,15 @@ def test_a_switch_shows_the_end_at_which_the_antenna_is_whatever_the_sector_bit_
 ) -> None:
     config = replace(CONFIG, azimuth=AxisLimits(*limits, 20.0, 10.0))
     at_end = replace(status(AcuMode.STANDBY, is_sector_high=is_high, **{switch: True}), az_deg=place_deg % 360.0)
-    assert tick(ControlState(), saw(at_end), Sky(), NOW, config)[0].az_deg == pytest.approx(place_deg)
+    assert tick(ControlState(), saw(at_end), Sky(), NOW, config)[0].intake.az_deg == pytest.approx(place_deg)
     for other in set(ENDS) - {switch}:  # no switch at the other end, and none of the elevation, says so
         wrong = replace(at_end, **{switch: False, other: True})
         by_bit, _ = tick(ControlState(), saw(replace(wrong, **{other: False})), Sky(), NOW, config)
         shown, _ = tick(ControlState(), saw(wrong), Sky(), NOW, config)
         if limits == (-180.0, 180.0) and not other.startswith(("is_at_up", "is_at_down")):
-            assert shown.az_deg == -place_deg  # both ends have the bearing
+            assert shown.intake.az_deg == -place_deg  # both ends have the bearing
         else:
-            assert shown.az_deg == by_bit.az_deg
+            assert shown.intake.az_deg == by_bit.intake.az_deg
 
 
 # What a bit decides, and where
@@ -125,7 +128,7 @@ def outcome(situation: str, flag: str | None) -> tuple[object, ...]:
     track, mode = SITUATIONS[situation]
     seen = status(mode, is_remote_enabled=mode is not AcuMode.MANUAL)
     seen = replace(seen, az_deg=50.0, el_deg=EL_DEG, is_sector_high=True)
-    before = replace(
+    before = remembering(
         ready(track, seen),
         az_deg=50.0,
         hold_from_tai_s=NOW,
@@ -133,14 +136,14 @@ def outcome(situation: str, flag: str | None) -> tuple[object, ...]:
         has_locked=True,
         is_stow_kept=track is TrackState.STOW,
         faults_read=(False,) * 4,
-        extra_after_tai_s=NOW - 2.0,
+        again_tai_s=NOW - 2.0,
     )
     if flag is not None:
         seen = replace(seen, **{flag: not getattr(seen, flag)})
     near = replace(path(), az_deg=path().az_deg - AZ_DEG + 50.0, follow_az_deg=path().az_deg - AZ_DEG + 50.0)
     after, ordered = ticks(before, [seen] * 5, replace(SKY, prediction=near))
     sent = tuple((orders.first, orders.extra, tuple(e.name for e in orders.events)) for orders in ordered)
-    return sent, after.track, after.latch, after.disarmed_by, after.az_deg
+    return sent, after.tracking.track, after.latch.problem, after.arming.disarmed_by, after.intake.az_deg
 
 
 @pytest.mark.parametrize("flag", FLAGS)
@@ -166,11 +169,11 @@ def test_a_standby_is_the_acus_own_where_an_interlock_fault_is_new_and_else_anot
     flag: str | None, had_interlock_fault: bool
 ) -> None:
     held = Held(had_interlock_fault)
-    before = replace(ready(TrackState.HOLD_TLE, status(AcuMode.REMOTE_BACKUP)), held=held, hold_from_tai_s=NOW)
+    before = remembering(ready(TrackState.HOLD_TLE, status(AcuMode.REMOTE_BACKUP)), held=held, hold_from_tai_s=NOW)
     seen = status(AcuMode.STANDBY, **({flag: True} if flag else {}))
     state, _ = tick(before, saw(seen), SKY, NOW, CONFIG)
     is_own = flag == "has_interlock_fault" and not had_interlock_fault
-    assert (state.disarmed_by == "") == is_own
+    assert (state.arming.disarmed_by == "") == is_own
 
 
 @pytest.mark.parametrize("bit", range(4))
@@ -182,12 +185,12 @@ def test_of_the_fault_detail_the_emergency_stop_and_the_door_disarm_and_the_watc
     seen = status(AcuMode.FAULT, is_autotrack_selected=False, has_interlock_fault=True)
     state, _ = tick(ready(TrackState.FAULT, seen), saw(seen, extra=Exchange(ReadFaults(), faults)), SKY, NOW, CONFIG)
     by = {("interlock", 0): "the emergency stop", ("interlock", 1): "an open door"}
-    assert state.disarmed_by == by.get((nibble, bit), "")
+    assert state.arming.disarmed_by == by.get((nibble, bit), "")
     standby = status(AcuMode.STANDBY)
-    doubted = replace(ready(TrackState.IDLE, standby), is_stop_doubted=True, held=Held())
+    doubted = remembering(ready(TrackState.IDLE, standby), is_doubted=True, held=Held())
     state, _ = tick(doubted, Observation(extra=Exchange(ReadFaults(), faults)), SKY, NOW, CONFIG)
-    assert (state.disarmed_by == "") == ((nibble, bit) == ("system", 1))
-    assert not state.is_stop_doubted
+    assert (state.arming.disarmed_by == "") == ((nibble, bit) == ("system", 1))
+    assert not state.foreign_stop.is_doubted
 
 
 # What cannot be true at once

@@ -6,13 +6,15 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from memories import remembering
 from test_tick import CONFIG, FITTED, NOW, SKY, ready, saw, status
 
-from acu_daemon.control.changed import changed
 from acu_daemon.control.fence import READS, refusal
-from acu_daemon.control.state import ControlState, Exchange, Held, Observation, Orders, Request, Sky, Stage, Watchdog
+from acu_daemon.control.orders import Orders
+from acu_daemon.control.state import ControlState, Held, Stage, Watchdog
 from acu_daemon.control.states import ACTIVE, TrackState
 from acu_daemon.control.tick import tick
+from acu_daemon.control.tick_input import Exchange, Observation, Request, Sky
 from acu_daemon.protocol.messages import (
     Ack,
     AcuMode,
@@ -48,7 +50,7 @@ def moving(track: TrackState = TrackState.HOLD_FITTED, mode: AcuMode = AcuMode.R
     """A daemon whose writes the antenna follows."""
     before = status(mode)
     state = ready(track, before)
-    return replace(
+    return remembering(
         state, reading=saw(before).reading, in_force=(NOW - 0.1, 100.0, 40.0), watchdog=Watchdog.SET, held=Held()
     )
 
@@ -87,7 +89,7 @@ def test_p1_disarmed_in_mid_pass_it_stops_then_clears_the_watchdog_then_keeps_it
     state, sent = run(moving(track), status(AcuMode.REMOTE_BACKUP), 30, requests=(Request.DISARM,))
     assert orders_of(sent) == [Stop(), WriteParameter("W", 0)]
     assert not state.is_armed(GUARDED)
-    assert state.disarmed_by == "a person"
+    assert state.arming.disarmed_by == "a person"
 
 
 def test_p1_a_stop_that_is_not_acknowledged_is_repeated_and_nothing_else_is_sent() -> None:
@@ -106,20 +108,20 @@ def test_p1_armed_again_it_begins_with_the_present_angles() -> None:
     armed = replace(armed, reading=replace(armed.reading, tai_s=NOW + 4.9))
     state, orders = tick(state, armed, FITTED, NOW + 5.0, GUARDED)
     assert state.is_armed(GUARDED)
-    assert state.stage is Stage.REGISTERS_KNOWN
+    assert state.startup.stage is Stage.REGISTERS_KNOWN
     assert asked_by(orders) == ReadParameter("S")
 
 
 def test_p1_a_shadow_is_never_armed() -> None:
     shadow = replace(GUARDED, is_shadow=True)
-    state = replace(moving(), stage=Stage.REGISTERS_KNOWN)
+    state = remembering(moving(), stage=Stage.REGISTERS_KNOWN)
     state, sent = run(state, status(), 20, shadow, requests=(Request.ARM,))
     assert not state.is_armed(shadow)
     assert orders_of(sent) == []
 
 
 def test_a_daemon_that_never_moved_anything_sends_no_stop_when_it_is_disarmed() -> None:
-    state = replace(ready(TrackState.IDLE, status(AcuMode.STANDBY)), stage=Stage.REGISTERS_KNOWN, in_force=None)
+    state = remembering(ready(TrackState.IDLE, status(AcuMode.STANDBY)), stage=Stage.REGISTERS_KNOWN, in_force=None)
     _, sent = run(state, status(AcuMode.STANDBY), 10, requests=(Request.DISARM,))
     assert orders_of(sent) == []
 
@@ -136,29 +138,29 @@ def test_disarmed_while_the_local_panel_has_control_no_stop_is_owed_later() -> N
 
 
 def latched(**changes: object) -> ControlState:
-    return replace(moving(), latch=LATCH, is_stop_due=True, **changes)  # type: ignore[arg-type]
+    return remembering(moving(), problem=LATCH, is_stop_due=True, **changes)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("mode", [AcuMode.REMOTE, AcuMode.REMOTE_BACKUP, AcuMode.AUTOTRACK, AcuMode.STANDBY])
 def test_p6_latched_it_sends_stop_until_it_is_acknowledged_and_no_more(mode: AcuMode) -> None:
     state, sent = run(latched(), status(mode), 30)
     assert orders_of(sent) == [Stop()]
-    assert state.track is TrackState.FAULT
+    assert state.tracking.track is TrackState.FAULT
 
 
 def test_p6_the_latch_outlives_a_lost_link_and_whatever_the_acu_does() -> None:
     state, _ = run(latched(), status(AcuMode.STANDBY), 5)
     state, _ = tick(state, Observation(silence_s=3.0), FITTED, NOW + 9.0, GUARDED)
-    assert state.track is TrackState.LINK_LOST
+    assert state.tracking.track is TrackState.LINK_LOST
     for mode in AcuMode:
         state, sent = run(state, status(mode), 12)
         assert orders_of(sent) == []
-        assert state.latch == LATCH
-    assert state.track is TrackState.FAULT
+        assert state.latch.problem == LATCH
+    assert state.tracking.track is TrackState.FAULT
 
 
 def test_p6_a_restart_with_a_latch_knows_the_acu_stops_the_antenna_once_and_moves_nothing() -> None:
-    state, sent, extra = ControlState(latch=LATCH, is_stop_due=True), [], None
+    state, sent, extra = remembering(problem=LATCH, is_stop_due=True), [], None
     for k in range(30):
         state, orders = tick(state, saw(status(AcuMode.REMOTE), extra=extra), FITTED, NOW + 0.1 * k, GUARDED)
         asked = asked_by(orders)
@@ -167,16 +169,16 @@ def test_p6_a_restart_with_a_latch_knows_the_acu_stops_the_antenna_once_and_move
         sent += [asked] if asked is not None else []
     assert sent[:2] == [Identify(), Stop()]
     assert orders_of(sent) == [Stop()]
-    assert (state.track, state.latch) == (TrackState.FAULT, LATCH)
+    assert (state.tracking.track, state.latch.problem) == (TrackState.FAULT, LATCH)
 
 
 def test_p6_only_a_person_clears_it_and_the_start_order_begins_anew() -> None:
     state, _ = run(latched(), status(AcuMode.STANDBY), 5)
     state, _ = run(state, status(AcuMode.STANDBY), 3, requests=(Request.ARM, Request.DISARM, Request.ARM))
-    assert state.latch == LATCH
+    assert state.latch.problem == LATCH
     state, orders = tick(state, saw(status(AcuMode.STANDBY), requests=(Request.CLEAR,)), FITTED, NOW + 9.0, GUARDED)
-    assert state.latch == ""
-    assert state.stage < Stage.READY
+    assert state.latch.problem == ""
+    assert state.startup.stage < Stage.READY
     assert not isinstance(orders.first, WriteAndPoll)
 
 
@@ -187,8 +189,8 @@ def test_p6_only_a_person_clears_it_and_the_start_order_begins_anew() -> None:
 def test_a_stop_by_another_hand_is_respected_until_a_person_arms(mode: AcuMode) -> None:
     state, sent = run(moving(mode=mode), status(AcuMode.STANDBY), 50)
     assert orders_of(sent) == [WriteParameter("W", 0)]
-    assert state.disarmed_by == "another hand that stopped the antenna"
-    assert state.track is TrackState.IDLE
+    assert state.arming.disarmed_by == "another hand that stopped the antenna"
+    assert state.tracking.track is TrackState.IDLE
     state, sent = run(state, status(AcuMode.STANDBY), 2, requests=(Request.ARM,))
     assert state.is_armed(GUARDED)
 
@@ -222,8 +224,8 @@ def test_standby_by_the_acus_own_doing_is_no_stop(seen: Status) -> None:
 def test_p1_standby_after_an_outage_is_a_stop_unless_the_register_watchdog_shows(
     unwritten_s: float, had_fault: bool, has_fault: bool, is_armed: bool, track: TrackState
 ) -> None:
-    state = replace(moving(), held=Held(had_fault), in_force=(NOW - unwritten_s, 100.0, 40.0), track=track)
-    state = replace(state, stage=Stage.NEW if track is TrackState.LINK_LOST else Stage.READY)
+    state = remembering(moving(), held=Held(had_fault), in_force=(NOW - unwritten_s, 100.0, 40.0), track=track)
+    state = remembering(state, stage=Stage.NEW if track is TrackState.LINK_LOST else Stage.READY)
     state, sent = run(state, status(AcuMode.STANDBY, has_interlock_fault=has_fault), 5)
     assert state.is_armed(GUARDED) is is_armed
     assert is_armed or orders_of(sent) in ([], [WriteParameter("W", 0)])
@@ -234,12 +236,12 @@ HELD = Held()
 
 def started_again(seen: Status, held: Held | None = HELD, **first) -> tuple[ControlState, list[Command]]:
     """A new daemon on what a crash left; it comes as far as the registers."""
-    return run(ControlState(held=held), seen, 12, **first)
+    return run(remembering(held=held), seen, 12, **first)
 
 
 def test_p1_a_stop_while_the_daemon_was_dead_disarms_it() -> None:
     state, sent = started_again(status(AcuMode.STANDBY))
-    assert (state.is_armed(GUARDED), state.disarmed_by) == (False, "another hand that stopped the antenna")
+    assert (state.is_armed(GUARDED), state.arming.disarmed_by) == (False, "another hand that stopped the antenna")
     assert orders_of(sent) == []
 
 
@@ -272,33 +274,33 @@ def test_p4_after_a_crash_it_goes_on_where_the_acu_shows_its_own_doing(seen: Sta
 def test_p1_p4_where_the_status_shows_no_watchdog_nothing_is_sent_until_the_fault_detail_tells(
     reply: Reply | None, is_armed: bool, is_settled: bool
 ) -> None:
-    state = replace(moving(), in_force=(NOW - 6.0, 100.0, 40.0))
+    state = remembering(moving(), in_force=(NOW - 6.0, 100.0, 40.0))
     state, sent = run(state, status(AcuMode.STANDBY))
-    assert (state.is_stop_doubted, sent) == (True, [Poll(), ReadFaults()])
+    assert (state.foreign_stop.is_doubted, sent) == (True, [Poll(), ReadFaults()])
     state, sent = run(state, status(AcuMode.STANDBY), extra=Exchange(ReadFaults(), reply))
-    assert (state.is_armed(GUARDED), state.is_stop_doubted) == (is_armed, not is_settled)
+    assert (state.is_armed(GUARDED), state.foreign_stop.is_doubted) == (is_armed, not is_settled)
     assert is_settled or sent == [Poll()]
 
 
 def test_p1_a_stow_while_the_daemon_was_dead_is_kept() -> None:
     seen = status(AcuMode.STOWED, is_autotrack_selected=False)
-    assert started_again(seen)[0].track is TrackState.STOW
-    assert started_again(seen, None)[0].track is TrackState.IDLE
+    assert started_again(seen)[0].tracking.track is TrackState.STOW
+    assert started_again(seen, None)[0].tracking.track is TrackState.IDLE
 
 
 def test_a_person_who_arms_before_the_acu_answers_is_believed() -> None:
     state, _ = started_again(status(AcuMode.STANDBY), requests=(Request.ARM,))
     assert state.is_armed(GUARDED)
-    lost = replace(moving(), track=TrackState.LINK_LOST, stage=Stage.NEW, in_force=(NOW - 2.0, 100.0, 40.0))
+    lost = remembering(moving(), track=TrackState.LINK_LOST, stage=Stage.NEW, in_force=(NOW - 2.0, 100.0, 40.0))
     lost, _ = tick(lost, Observation(silence_s=2.0, requests=(Request.ARM,)), FITTED, NOW, GUARDED)
     assert run(lost, status(AcuMode.STANDBY))[0].is_armed(GUARDED)
 
 
 def test_an_acu_found_autotracking_far_from_the_path_is_not_believed() -> None:
     other = replace(status(), az_deg=200.0, el_deg=15.0)
-    state = replace(ready(TrackState.IDLE, other), az_deg=-160.0)
-    assert tick(state, saw(other), FITTED, NOW, CONFIG)[0].track is TrackState.PREPOSITION
-    assert tick(ready(TrackState.IDLE, status()), saw(status()), FITTED, NOW, CONFIG)[0].track is (
+    state = remembering(ready(TrackState.IDLE, other), az_deg=-160.0)
+    assert tick(state, saw(other), FITTED, NOW, CONFIG)[0].tracking.track is TrackState.PREPOSITION
+    assert tick(ready(TrackState.IDLE, status()), saw(status()), FITTED, NOW, CONFIG)[0].tracking.track is (
         TrackState.AUTOTRACK_FITTED
     )
 
@@ -329,10 +331,10 @@ def after_fault(faults: Faults) -> tuple[ControlState, list[Command]]:
 def test_p1_an_emergency_stop_or_an_open_door_disarms_until_a_person_arms(faults: Faults, by: str) -> None:
     state, sent = after_fault(faults)
     assert orders_of(sent) == [WriteParameter("W", 0)]
-    assert (state.is_armed(GUARDED), state.disarmed_by) == (False, by)
-    assert state.track is TrackState.IDLE
+    assert (state.is_armed(GUARDED), state.arming.disarmed_by) == (False, by)
+    assert state.tracking.track is TrackState.IDLE
     state, _ = run(state, status(AcuMode.STANDBY), 2, requests=(Request.ARM,))
-    assert (state.is_armed(GUARDED), state.disarmed_by) == (True, "")
+    assert (state.is_armed(GUARDED), state.arming.disarmed_by) == (True, "")
 
 
 @pytest.mark.parametrize("faults", [Faults(azimuth=1), Faults(interlock=4), Faults(interlock=8), Faults(system=2)])
@@ -348,12 +350,12 @@ def test_p1_armed_while_the_button_is_still_pressed_it_is_disarmed_again_and_doe
 ) -> None:
     state, _ = run(moving(), PRESSED, requests=(Request.DISARM,) if by == "a person" else ())
     state, _ = run(state, PRESSED, 5, extra=Exchange(ReadFaults(), Faults(interlock=1)))
-    assert state.disarmed_by == by
+    assert state.arming.disarmed_by == by
     state, sent = run(state, PRESSED, requests=(Request.ARM,))
     state, more = run(state, PRESSED)
     assert ReadFaults() in sent + more
     state, _ = run(state, PRESSED, 5, extra=Exchange(ReadFaults(), Faults(interlock=1)))
-    assert (state.is_armed(GUARDED), state.disarmed_by) == (False, "the emergency stop")
+    assert (state.is_armed(GUARDED), state.arming.disarmed_by) == (False, "the emergency stop")
 
 
 def test_p1_armed_in_any_other_fault_the_daemon_goes_on_when_it_is_over() -> None:
@@ -364,7 +366,7 @@ def test_p1_armed_in_any_other_fault_the_daemon_goes_on_when_it_is_over() -> Non
 
 def test_a_shadow_leaves_it_as_it_was_who_holds_the_antenna() -> None:
     state, _ = run(moving(), status(AcuMode.AUTOTRACK), 3, config=replace(GUARDED, is_shadow=True))
-    assert state.held == Held()
+    assert state.foreign_stop.held == Held()
 
 
 # The fence
@@ -388,8 +390,8 @@ DANGEROUS: tuple[Command, ...] = (
 @pytest.mark.parametrize(
     ("change", "config"),
     [
-        ({"arming": False}, CONFIG),
-        ({"latch": LATCH}, CONFIG),
+        ({"by_people": False}, CONFIG),
+        ({"problem": LATCH}, CONFIG),
         ({"stage": Stage.NEW}, CONFIG),
         ({"status": status(AcuMode.MANUAL, is_remote_enabled=False)}, CONFIG),
         ({"status": None}, CONFIG),
@@ -398,7 +400,7 @@ DANGEROUS: tuple[Command, ...] = (
     ids=["disarmed", "latched", "not started", "local panel", "no status", "shadow"],
 )
 def test_p5_no_order_passes_the_fence_where_it_has_no_business(command, change, config) -> None:
-    assert refusal(command, replace(moving(), **change), config)
+    assert refusal(command, remembering(moving(), **change), config)
 
 
 @pytest.mark.parametrize("command", [Stow(), ResetFault(), ClearChange(), SelectBackup(Backup.RATE)], ids=str)
@@ -427,9 +429,9 @@ def test_p5_no_register_write_outside_the_limits_passes(az_deg, el_deg, kind) ->
 def test_p5_whatever_the_memory_holds_every_order_has_passed_the_fence(
     track, mode, stage, is_remote, is_shadow, arming, latch, is_stop_due, requests, is_fitted
 ) -> None:
-    memory = {"stage": stage, "arming": arming, "latch": latch, "is_stop_due": is_stop_due}
+    memory = {"stage": stage, "by_people": arming, "problem": latch, "is_stop_due": is_stop_due}
     seen = saw(status(mode, is_remote_enabled=is_remote), requests=tuple(requests))
-    check_fence(replace(moving(track, mode), **memory), seen, FITTED if is_fitted else SKY, is_shadow=is_shadow)
+    check_fence(remembering(moving(track, mode), **memory), seen, FITTED if is_fitted else SKY, is_shadow=is_shadow)
 
 
 @pytest.mark.parametrize("is_shadow", [False, True])
@@ -441,14 +443,14 @@ def test_p5_from_every_state_mode_and_stage_every_order_has_passed_the_fence(is_
         for is_remote in flags:
             seen = saw(status(mode, is_remote_enabled=is_remote))
             for stage, arming, latch, is_due in itertools.product(Stage, (None, *flags), ("", LATCH), flags):
-                state = changed(begun, stage=stage, arming=arming, latch=latch, is_stop_due=is_due)
+                state = remembering(begun, stage=stage, by_people=arming, problem=latch, is_stop_due=is_due)
                 check_fence(state, seen, FITTED if is_due else SKY, is_shadow=is_shadow)
 
 
 def check_fence(state: ControlState, seen: Observation, sky: Sky, *, is_shadow: bool) -> None:
     config = SHADOW if is_shadow else GUARDED
     after, orders = tick(state, seen, sky, NOW, config)
-    assert after.gate_refusal_count == state.gate_refusal_count  # the fence had nothing to keep back
+    assert after.refusals.refusal_count == state.refusals.refusal_count  # the fence had nothing to keep back
     for command in (orders.first, orders.extra):
         assert command is None or refusal(command, after, config) == ""
     check_hands(after, orders, config)
@@ -458,7 +460,7 @@ def check_hands(after: ControlState, orders: Orders, config) -> None:
     sent = orders_of([command for command in (orders.first, orders.extra) if command is not None])
     if config.is_shadow:
         assert sent == []
-    elif after.latch or not after.is_armed(config):
+    elif after.latch.problem or not after.is_armed(config):
         assert set(sent) <= {Stop(), WriteParameter("W", 0)}
 
 
@@ -466,7 +468,7 @@ def check_hands(after: ControlState, orders: Orders, config) -> None:
 
 
 def test_the_watchdog_is_read_written_and_read_back_once_the_start_is_done() -> None:
-    state = replace(ready(TrackState.IDLE, status(AcuMode.STANDBY)), in_force=None)
+    state = remembering(ready(TrackState.IDLE, status(AcuMode.STANDBY)), in_force=None)
     code, asked = 0, []
     extra = None
     for k in range(12):
@@ -479,7 +481,7 @@ def test_the_watchdog_is_read_written_and_read_back_once_the_start_is_done() -> 
         if extra is not None:
             asked.append(orders.extra)
     assert asked == [ReadParameter("W"), WriteParameter("W", 250), ReadParameter("W")]
-    assert state.watchdog is Watchdog.SET
+    assert state.startup.watchdog is Watchdog.SET
 
 
 @pytest.mark.parametrize("reply", [Nak(), None], ids=["refused", "never answered"])

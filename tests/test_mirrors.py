@@ -8,7 +8,8 @@ import pytest
 from mirrors import MIRRORS, Mirror
 from troubled_decision import TroubledDecision
 
-from acu_daemon.control.state import ControlState, Orders
+from acu_daemon.control.orders import Orders
+from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick import tick
 from acu_daemon.protocol.angles import LSB_DEG
 from acu_daemon.protocol.messages import Command, WriteAndPoll, WriteRegisters
@@ -35,17 +36,24 @@ def facts(orders: Orders) -> list[tuple[str, Any, Any]]:
 
 def memory(state: ControlState) -> tuple[Any, ...]:
     """What a mirror does not change."""
-    counts = (state.gate_refusal_count, state.gate_clamped_count, state.gate_limited_count)
+    counts = (state.refusals.refusal_count, state.refusals.clamped_count, state.refusals.limited_count)
     turn = (state.turn.phase, state.turn.is_sure, state.turn.learned_count, state.turn.bit_score)
-    where = (state.track, state.stage, state.latch, state.is_stop_due, state.has_locked, state.was_followed)
-    return (*where, *turn, *counts, state.encoders.problem, state.scan.side)
+    where = (
+        state.tracking.track,
+        state.startup.stage,
+        state.latch.problem,
+        state.arming.is_stop_due,
+        state.signal.has_locked,
+        state.registers.was_followed,
+    )
+    return (*where, *turn, *counts, state.encoders.problem, state.search.scan.side)
 
 
 def lags(state: ControlState) -> list[float]:
     """What was learned of both."""
     return [
         number
-        for lag in (state.lag_az, state.lag_el)
+        for lag in (state.lag.az, state.lag.el)
         for number in (lag.count, lag.sum_ss_deg2, lag.sum_sx_deg2, lag.sum_xx_deg2)
     ]
 
@@ -78,6 +86,6 @@ def test_the_runs_go_through_all_that_a_mirror_could_show() -> None:
     runs = [run_of(seed) for seed in SEEDS]
     events = Counter(event.name for _, ordered in runs for _, orders in ordered for event in orders.events)
     assert not SEEN - set(events), events
-    states = Counter(state.track for _, ordered in runs for state, _ in ordered)
+    states = Counter(state.tracking.track for _, ordered in runs for state, _ in ordered)
     assert len(states) == 12, states
-    assert sum(ordered[-1][0].lag_az.count for _, ordered in runs) > 50
+    assert sum(ordered[-1][0].lag.az.count for _, ordered in runs) > 50

@@ -7,13 +7,15 @@ import pytest
 from flights import RISING_ANTENNA, RISING_TAI_S, demo_target, flight_of, worst_error_deg
 from hypothesis import given
 from hypothesis import strategies as st
+from memories import remembering
 from test_daemon_events import NeverFitting
 from test_tick import AZ_DEG, CONFIG, EL_DEG, NOW, PLAN, SKY, ready, saw, status
 
 from acu_daemon.assist.prediction import predict
-from acu_daemon.control.state import ControlState, PathOffset, Sky
+from acu_daemon.control.state import ControlState, PathOffset
 from acu_daemon.control.states import TrackState
 from acu_daemon.control.tick import tick
+from acu_daemon.control.tick_input import Sky
 from acu_daemon.control.track_frame import beside, extents, offset_of
 from acu_daemon.model import Model, Prediction, sky_angle_deg
 from acu_daemon.orbit.look import look_at
@@ -79,7 +81,12 @@ def test_what_is_autotracked_in_another_state_tells_nothing_of_the_path_nor_of_t
     for k in range(30):
         reading = replace(saw(other).reading, tai_s=NOW - 200.0 + 0.1 * k)  # type: ignore[type-var]
         state, _ = tick(state, replace(saw(other), reading=reading), SKY, NOW - 199.9 + 0.1 * k, CONFIG)
-    assert (state.offset, state.has_acquired, state.has_locked, state.encoders.problem) == (None, False, False, "")
+    assert (state.signal.offset, state.signal.has_acquired, state.signal.has_locked, state.encoders.problem) == (
+        None,
+        False,
+        False,
+        "",
+    )
 
 
 def test_forty_degrees_aside_are_refused_once_told_and_drive_nothing() -> None:
@@ -87,13 +94,13 @@ def test_forty_degrees_aside_are_refused_once_told_and_drive_nothing() -> None:
     wrong = replace(status(), az_deg=az_deg, el_deg=el_deg)
     state, orders = tick(ready(TrackState.AUTOTRACK_TLE, wrong), saw(wrong), SKY, NOW, CONFIG)
     assert [event.name for event in orders.events] == ["offset.refused"]
-    assert state.offset is None
+    assert state.signal.offset is None
     again, orders = tick(state, saw(wrong), SKY, NOW + 0.1, CONFIG)
     assert [event.name for event in orders.events] == []
     assert isinstance(orders.first, WriteAndPoll)
     assert orders.first.az_deg == pytest.approx(AZ_DEG, abs=0.2)
     held, _ = tick(again, saw(status(AcuMode.REMOTE_BACKUP)), SKY, NOW + 0.2, CONFIG)
-    assert (held.track, held.offset) == (TrackState.HOLD_TLE, None)
+    assert (held.tracking.track, held.signal.offset) == (TrackState.HOLD_TLE, None)
 
 
 def test_the_bound_is_the_searchs_or_three_sigma_of_the_elements() -> None:
@@ -105,8 +112,8 @@ def test_the_bound_is_the_searchs_or_three_sigma_of_the_elements() -> None:
 
 
 def learned() -> ControlState:
-    state = replace(ready(TrackState.AUTOTRACK_TLE, status()), pass_rise_tai_s=PLAN.rise_tai_s)
-    return replace(state, offset=PathOffset(2.0, 0.3, Model.ELEMENTS), has_locked=True, has_acquired=True)
+    state = remembering(ready(TrackState.AUTOTRACK_TLE, status()), pass_rise_tai_s=PLAN.rise_tai_s)
+    return remembering(state, offset=PathOffset(2.0, 0.3, Model.ELEMENTS), has_locked=True, has_acquired=True)
 
 
 def test_it_is_forgotten_with_the_pass() -> None:
@@ -114,8 +121,9 @@ def test_it_is_forgotten_with_the_pass() -> None:
     lost = status(AcuMode.REMOTE_BACKUP)
     kept, _ = tick(learned(), saw(lost), SKY, NOW, CONFIG)
     state, _ = tick(learned(), saw(lost), other, NOW, CONFIG)
-    assert (kept.offset, kept.has_locked, kept.has_acquired) == (PathOffset(2.0, 0.3, Model.ELEMENTS), True, True)
-    assert (state.offset, state.has_locked, state.has_acquired) == (None, False, False)
+    known = PathOffset(2.0, 0.3, Model.ELEMENTS)
+    assert (kept.signal.offset, kept.signal.has_locked, kept.signal.has_acquired) == (known, True, True)
+    assert (state.signal.offset, state.signal.has_locked, state.signal.has_acquired) == (None, False, False)
 
 
 def test_what_was_learned_beside_one_model_is_not_put_beside_another() -> None:

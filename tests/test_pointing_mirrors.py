@@ -10,8 +10,9 @@ from mirrors import MIRRORS, Mirror
 from test_control_search import straight_path
 
 from acu_daemon.control.approach import way_s
+from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.search import go_on, pace_s_s, pointing
-from acu_daemon.control.state import ControlConfig, Scan
+from acu_daemon.control.state import Scan
 from acu_daemon.control.turn import TurnWatch, is_pulled_round, watch_goal
 from acu_daemon.model import AxisLimits, Model, Reading
 from acu_daemon.pointing.axis import AxisState, step

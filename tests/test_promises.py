@@ -177,7 +177,7 @@ class Promises(RuleBasedStateMachine):
         rig.judge.read_files()
         assert not rig.judge.broken, rig.judge.broken
         if rig.clock.tai_s() < rig.coming.set_tai_s - 60.0:
-            order_count, track = rig.judge.order_count - before, rig.state.track
+            order_count, track = rig.judge.order_count - before, rig.state.tracking.track
             assert order_count >= 9, f"{order_count} orders in a second, {track}, {rig.state}"
             is_waiting = track == "ACQUIRE/TLE" and rig.service._area.sky.fit is None  # on the path of the elements
             assert track in SERVING or is_waiting, track
@@ -205,7 +205,7 @@ def test_another_connection_is_read_before_it_is_commanded_however_soon_it_came(
             rig.fault("reset")
             rig.wait(1.0)
         assert not rig.judge.broken, rig.judge.broken
-        assert rig.state.track == "AUTOTRACK/FITTED"
+        assert rig.state.tracking.track == "AUTOTRACK/FITTED"
 
 
 def test_a_daemon_that_stalls_for_most_of_a_period_skips_the_tick_that_follows(tmp_path: Path) -> None:

@@ -4,12 +4,12 @@ Every part of whose it is changes alone; and so does what the last pass left to 
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from config_files import BROUWER, STATION, replaced, write
+from memories import remembering
 from structlog.testing import capture_logs
 
 from acu_daemon.assist.carry_over import CarryOver
@@ -77,9 +77,9 @@ class Place:
     def leave(self) -> None:
         """Track for a while, and end."""
         kept, files = self.opened()
-        kept.see(replace(ControlState(), track=TrackState.AUTOTRACK_FITTED, arming=True))
+        kept.see(remembering(track=TrackState.AUTOTRACK_FITTED, by_people=True))
         kept.offer(self.fit())
-        kept.see(replace(ControlState(), track=TrackState.HOLD_FITTED, arming=True))
+        kept.see(remembering(track=TrackState.HOLD_FITTED, by_people=True))
         kept.flush()
         assert files.close(60.0)
 
@@ -99,7 +99,7 @@ def test_the_same_run_is_gone_on_from_with_its_fit_and_its_memory(tmp_path: Path
     assert carried is not None
     assert carried.is_of_this_pass
     assert carried.estimator == estimator
-    assert state.arming is True
+    assert state.arming.by_people is True
     assert "run.resumed" in said
 
 
@@ -113,7 +113,7 @@ def test_the_fit_of_another_estimator_is_not_gone_on_from(tmp_path: Path, before
     assert ("run.resumed" in said) is (before == after)
     assert ("run_state.dropped" in said) is (before != after)
     assert carried is None or carried.is_of_this_pass is (before == after)
-    assert state.arming is True  # it is the same pass of the same antenna all the same
+    assert state.arming.by_people is True  # it is the same pass of the same antenna all the same
 
 
 @pytest.mark.parametrize("part", sorted(OTHERS))
@@ -144,7 +144,7 @@ def test_another_satellite_takes_neither_the_fit_nor_the_memory(tmp_path: Path) 
     place.leave()
     place.configure(satellite=replaced(BROUWER, *NAME))
     carried, state, said = place.gone_on_from()
-    assert (carried, state.arming) == (None, None)
+    assert (carried, state.arming.by_people) == (None, None)
     assert "run.resumed" not in said
 
 
@@ -168,4 +168,4 @@ def test_another_pass_or_rehearsal_takes_only_what_a_pass_leaves_to_the_next(
     assert "carry_over.used" in said
     assert carried is not None
     assert not carried.is_of_this_pass
-    assert state.arming is None
+    assert state.arming.by_people is None

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from memories import remembering
 from structlog.testing import capture_logs
 from test_carry_over_file import CARRIED, FIT
 
-from acu_daemon.control.state import ControlState, Held
+from acu_daemon.control.state import Held
 from acu_daemon.control.states import TrackState
 from acu_daemon.edge.run_state import RETRY_TICKS, RUN_STATE, RunState, RunStateKeeper, read_run_state
 from acu_daemon.edge.writer import Writer
@@ -25,7 +26,7 @@ def written(directory: Path, state: RunState = STATE) -> Path:
     writer = Writer("files")
     keeper = RunStateKeeper(directory, writer, replace(state, track=""), lambda _: None)
     held = None if state.held is None else Held(state.held)
-    keeper.see(replace(ControlState(), track=TrackState(state.track), arming=state.arming, held=held))
+    keeper.see(remembering(track=TrackState(state.track), by_people=state.arming, held=held))
     assert writer.close(60.0)
     return directory / RUN_STATE
 
@@ -127,14 +128,14 @@ def test_another_rehearsal_of_the_pass_is_not_gone_on_with(clock_s: float | None
 def test_a_change_is_written_and_a_tick_without_one_is_not(tmp_path: Path) -> None:
     writer = Writer("files")
     keeper = RunStateKeeper(tmp_path, writer, STATE, lambda fit: replace(CARRIED, at_tai_s=fit.at_tai_s))
-    state = replace(ControlState(), track=TrackState.HOLD_FITTED, arming=True, held=Held())
+    state = remembering(track=TrackState.HOLD_FITTED, by_people=True, held=Held())
     for _ in range(10):
         keeper.see(state)
     while writer.waiting_count or keeper._latest._is_waiting:
         pass
     assert not (tmp_path / RUN_STATE).exists()
     keeper.offer(replace(FIT, at_tai_s=5.0))
-    keeper.see(replace(state, arming=False))
+    keeper.see(remembering(state, by_people=False))
     assert writer.close(60.0)
     read = read_run_state(tmp_path)
     assert read.fit is not None
@@ -147,7 +148,7 @@ def test_p10_a_full_disk_is_told_at_its_edges(tmp_path: Path) -> None:
     keeper = RunStateKeeper(gone, writer, STATE, lambda _: None)
 
     def see(track: TrackState) -> None:
-        keeper.see(replace(ControlState(), track=track))
+        keeper.see(remembering(track=track))
         while keeper._latest._is_waiting or writer.waiting_count:
             pass
 
@@ -165,7 +166,7 @@ def test_p10_a_full_disk_is_told_at_its_edges(tmp_path: Path) -> None:
 def test_p10_what_a_full_disk_refused_is_written_again_though_nothing_changes(tmp_path: Path) -> None:
     writer, gone = Writer("files"), tmp_path / "gone"
     keeper = RunStateKeeper(gone, writer, STATE, lambda _: None)
-    state = replace(ControlState(), track=TrackState.HOLD_FITTED, arming=True)
+    state = remembering(track=TrackState.HOLD_FITTED, by_people=True)
 
     def ticks(count: int) -> None:
         for _ in range(count):

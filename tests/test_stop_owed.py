@@ -5,14 +5,16 @@ from pathlib import Path
 
 import pytest
 from flights import RISING_TAI_S, climb, commands_between
+from memories import remembering
 from promise_rig import Rig, demo_scene
 from test_hands import GUARDED, latched, moving
 from test_tick import FITTED, NOW, SKY, saw, status
 
 from acu_daemon.cli.virtual_pass import Stage as Rigged
 from acu_daemon.control.fence import READS
-from acu_daemon.control.state import ControlState, Exchange, Observation, Request, Stage, Watchdog
+from acu_daemon.control.state import ControlState, Stage, Watchdog
 from acu_daemon.control.tick import tick
+from acu_daemon.control.tick_input import Exchange, Observation, Request
 from acu_daemon.pointing.axis import AxisState
 from acu_daemon.protocol.messages import AcuMode, Command, Nak, Reply, Status, Stop, WriteParameter
 
@@ -35,26 +37,26 @@ def asked(state: ControlState, *requests: Request) -> ControlState:
     ids=lambda requests: " ".join(requests),
 )
 def test_p6_the_stop_of_a_latch_that_was_not_acknowledged_yet_outlives_what_a_person_says(requests) -> None:
-    assert asked(latched(), *requests).is_stop_due
-    assert asked(replace(latched(), in_force=None), *requests).is_stop_due  # in a daemon that was started again
+    assert asked(latched(), *requests).arming.is_stop_due
+    assert asked(remembering(latched(), in_force=None), *requests).arming.is_stop_due  # started again
 
 
 def test_p1_disarmed_in_a_daemon_that_was_started_again_what_the_one_before_has_moved_is_stopped() -> None:
-    assert asked(replace(moving(), in_force=None), Request.DISARM).is_stop_due
-    assert not asked(replace(moving(), in_force=None, held=None), Request.DISARM).is_stop_due  # it is somebody else's
+    assert asked(remembering(moving(), in_force=None), Request.DISARM).arming.is_stop_due
+    assert not asked(remembering(moving(), in_force=None, held=None), Request.DISARM).arming.is_stop_due  # another's
 
 
 @pytest.mark.parametrize("requests", [(Request.CLEAR,), (Request.DISARM, Request.CLEAR, Request.ARM)])
 def test_cleared_and_armed_the_daemon_goes_on_and_owes_no_stop(requests) -> None:
-    assert not asked(latched(), *requests).is_stop_due
+    assert not asked(latched(), *requests).arming.is_stop_due
 
 
 @pytest.mark.parametrize("request_", [Request.ARM, Request.CLEAR])
 def test_p1_armed_or_cleared_nothing_of_the_registers_before_is_gone_on_from(request_: Request) -> None:
-    before = replace(latched(), axis_az=AxisState(200.0, 5.0), axis_el=AxisState(60.0, 2.0), was_followed=True)
-    before = replace(before, arming=False) if request_ is Request.ARM else before
+    before = remembering(latched(), axis_az=AxisState(200.0, 5.0), axis_el=AxisState(60.0, 2.0), was_followed=True)
+    before = remembering(before, by_people=False) if request_ is Request.ARM else before
     state, _ = tick(before, saw(status(AcuMode.REMOTE), requests=(request_,)), FITTED, NOW, GUARDED)
-    assert (state.axis_az, state.axis_el, state.was_followed) == (None, None, False)
+    assert (state.registers.axis_az, state.registers.axis_el, state.registers.was_followed) == (None, None, False)
 
 
 def extras(state: ControlState, seen: Status, reply: Reply | None) -> list[Command | None]:
@@ -75,7 +77,7 @@ def test_p6_a_stop_that_was_garbled_into_a_refusal_is_repeated_at_once() -> None
 
 
 def test_the_register_watchdog_is_cleared_again_when_nobody_answered_but_not_for_ever_when_it_is_refused() -> None:
-    disarmed = replace(moving(), arming=False, stage=Stage.REGISTERS_KNOWN)
+    disarmed = remembering(moving(), by_people=False, stage=Stage.REGISTERS_KNOWN)
     cleared = WriteParameter("W", 0)
     assert extras(disarmed, status(AcuMode.STANDBY), None).count(cleared) >= 5
     assert extras(disarmed, status(AcuMode.STANDBY), Nak()).count(cleared) == 1
@@ -83,8 +85,8 @@ def test_the_register_watchdog_is_cleared_again_when_nobody_answered_but_not_for
 
 @pytest.mark.parametrize("known", [Watchdog.SET, Watchdog.REFUSED])
 def test_p4_after_a_lost_link_the_register_watchdog_is_asked_for_again_unless_there_is_none(known: Watchdog) -> None:
-    lost = asked(replace(moving(), watchdog=known))
-    assert lost.watchdog is (Watchdog.UNKNOWN if known is Watchdog.SET else known)
+    lost = asked(remembering(moving(), watchdog=known))
+    assert lost.startup.watchdog is (Watchdog.UNKNOWN if known is Watchdog.SET else known)
 
 
 # In flight

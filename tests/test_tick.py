@@ -6,23 +6,19 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from memories import remembering
 
-from acu_daemon.control.absorb import REFUSED_EXTRA_S, REFUSED_PAUSE_S
 from acu_daemon.control.causes import LINK_SILENCE_S
+from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.extra_exchange import EXTRA_REPEAT_S, REFUSED_EXTRA_S
 from acu_daemon.control.fence import fence
 from acu_daemon.control.lag import LagEstimate
-from acu_daemon.control.state import (
-    ControlConfig,
-    ControlState,
-    Exchange,
-    Observation,
-    Orders,
-    PassPlan,
-    Sky,
-    Stage,
-)
+from acu_daemon.control.orders import Orders
+from acu_daemon.control.registers import REFUSED_PAUSE_S
+from acu_daemon.control.state import ControlState, Lag, Stage
 from acu_daemon.control.states import ACTIVE, TrackState
-from acu_daemon.control.tick import EXTRA_REPEAT_S, tick
+from acu_daemon.control.tick import tick
+from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Sky
 from acu_daemon.model import AxisLimits, Prediction, Reading
 from acu_daemon.pointing.axis import AxisState
 from acu_daemon.protocol.angles import LSB_DEG
@@ -76,7 +72,7 @@ def status(mode: AcuMode = AcuMode.AUTOTRACK, **changes: object) -> Status:
 
 def ready(track: TrackState, seen: Status) -> ControlState:
     """A daemon that started long ago."""
-    return ControlState(
+    return remembering(
         track=track,
         entered_tai_s=NOW - 50.0,
         stage=Stage.READY,
@@ -126,35 +122,37 @@ def test_a_late_tick_aims_for_the_moment_it_really_writes() -> None:
 @pytest.mark.parametrize(("gap_s", "is_learned"), [(0.1, True), (0.13, False), (0.2, False)])
 def test_a_lag_is_learned_only_from_writes_that_come_a_period_apart(gap_s: float, is_learned: bool) -> None:
     """The stairs of a daemon without a processor, or of a line in trouble, are not those that the lag is read from."""
-    state = replace(ready(TrackState.HOLD_FITTED, status(AcuMode.REMOTE_BACKUP)), hold_from_tai_s=NOW)
+    state = remembering(ready(TrackState.HOLD_FITTED, status(AcuMode.REMOTE_BACKUP)), hold_from_tai_s=NOW)
     for k in range(30):
         now_tai_s = NOW + k * gap_s
         az_deg, el_deg = AZ_DEG + AZ_RATE * (k * gap_s - 0.05), EL_DEG + EL_RATE * (k * gap_s - 0.05)
         seen = replace(status(AcuMode.REMOTE_BACKUP), az_deg=az_deg, el_deg=el_deg)
         reading = Reading(now_tai_s - gap_s, az_deg, el_deg, is_locked=False)
         state, _ = tick(state, Observation(reading=reading, status=seen), FITTED, now_tai_s, CONFIG)
-    assert (state.lag_az.count > 0) is is_learned
-    assert (state.lag_el.count > 0) is is_learned
+    assert (state.lag.az.count > 0) is is_learned
+    assert (state.lag.el.count > 0) is is_learned
 
 
 def test_a_latch_forgets_the_lag_that_was_learned_of_an_axis_that_failed() -> None:
     seen = status(AcuMode.REMOTE_BACKUP)
-    state = replace(ready(TrackState.HOLD_FITTED, seen), hold_from_tai_s=NOW, lag_az=LagEstimate(500, 5.0, 2.0, 0.9))
+    state = remembering(
+        ready(TrackState.HOLD_FITTED, seen), hold_from_tai_s=NOW, lag=Lag(LagEstimate(500, 5.0, 2.0, 0.9))
+    )
     learned_s, _ = state.lag_s(CONFIG)
     for k in range(100):
         reading = Reading(NOW + 0.1 * k + 0.01, AZ_DEG, EL_DEG, False)  # it stands while the path goes on
         state, _ = tick(state, Observation(reading=reading, status=seen), FITTED, NOW + 0.1 * (k + 1), CONFIG)
-        if state.latch:
+        if state.latch.problem:
             break
-        assert state.lag_az.count >= 500
-    assert state.latch
+        assert state.lag.az.count >= 500
+    assert state.latch.problem
     assert state.lag_s(CONFIG)[0] != pytest.approx(learned_s)
-    assert state.lag_az == LagEstimate()
+    assert state.lag.az == LagEstimate()
 
 
 def test_the_tilt_register_goes_back_as_it_was_read() -> None:
     seen = status()
-    _, orders = tick(replace(ready(TrackState.IDLE, seen), tilt_code=4321), saw(seen), Sky(), NOW, CONFIG)
+    _, orders = tick(remembering(ready(TrackState.IDLE, seen), tilt_code=4321), saw(seen), Sky(), NOW, CONFIG)
     assert isinstance(orders.first, WriteAndPoll)
     assert orders.first.tilt_code == 4321
 
@@ -172,7 +170,7 @@ def test_without_room_in_the_cycle_an_extra_takes_the_place_of_one_write() -> No
 
 def test_without_room_no_two_writes_in_a_row_give_way() -> None:
     seen = status(AcuMode.STANDBY, backup_selected=Backup.RATE)
-    state = replace(ready(TrackState.HOLD_FITTED, seen), entered_tai_s=NOW - 1.0, hold_from_tai_s=NOW)
+    state = remembering(ready(TrackState.HOLD_FITTED, seen), entered_tai_s=NOW - 1.0, hold_from_tai_s=NOW)
     state, orders = tick(state, saw(seen, has_room=False), FITTED, NOW, CONFIG)
     assert orders.first == SelectBackup(Backup.REMOTE)
     selected = replace(seen, backup_selected=Backup.REMOTE)
@@ -197,7 +195,7 @@ def test_under_the_local_panel_it_polls_and_nothing_else(track: TrackState) -> N
 @pytest.mark.parametrize("track", list(TrackState))
 @pytest.mark.parametrize("mode", list(AcuMode))
 def test_disarmed_it_only_reads(track: TrackState, mode: AcuMode) -> None:
-    state = replace(ready(track, status(mode)), stage=Stage.REGISTERS_KNOWN)
+    state = remembering(ready(track, status(mode)), stage=Stage.REGISTERS_KNOWN)
     _, orders = tick(state, saw(status(mode)), SKY, NOW, replace(CONFIG, is_armed=False))
     assert orders.first == Poll()
     assert orders.extra is None or isinstance(orders.extra, ReadFaults)
@@ -205,7 +203,7 @@ def test_disarmed_it_only_reads(track: TrackState, mode: AcuMode) -> None:
 
 @pytest.mark.parametrize("stage", [stage for stage in Stage if stage is not Stage.READY])
 def test_before_the_start_is_done_no_path_is_written_and_no_mode_selected(stage: Stage) -> None:
-    state = replace(ready(TrackState.IDLE, status(AcuMode.STANDBY)), stage=stage)
+    state = remembering(ready(TrackState.IDLE, status(AcuMode.STANDBY)), stage=stage)
     _, orders = tick(state, saw(status(AcuMode.STANDBY)), FITTED, NOW, CONFIG)
     for order in (orders.first, orders.extra):
         assert not isinstance(order, WriteAndPoll | SelectMode | SelectBackup)
@@ -220,7 +218,7 @@ def test_a_start_goes_on_without_a_poll_while_it_is_sure_where_the_antenna_is(
 ) -> None:
     """On a slow line each poll beside the start's exchanges would cost half a tick."""
     seen = status(AcuMode.STANDBY)
-    state = replace(ready(TrackState.IDLE, seen), stage=Stage.NEW)
+    state = remembering(ready(TrackState.IDLE, seen), stage=Stage.NEW)
     _, orders = tick(state, saw(seen, is_confirmed=is_confirmed), FITTED, NOW + later_s, CONFIG)
     assert orders.first == first
 
@@ -231,15 +229,15 @@ def test_a_start_goes_on_without_a_poll_while_it_is_sure_where_the_antenna_is(
 def test_the_backup_is_selected_before_the_mode_and_the_mode_only_once_the_backup_shows() -> None:
     for backup, wanted in ((Backup.RATE, SelectBackup(Backup.REMOTE)), (Backup.REMOTE, SelectMode(AcuMode.AUTOTRACK))):
         seen = status(AcuMode.STANDBY, backup_selected=backup)
-        state = replace(ready(TrackState.ACQUIRE_TLE, seen), entered_tai_s=NOW - 1.0)
+        state = remembering(ready(TrackState.ACQUIRE_TLE, seen), entered_tai_s=NOW - 1.0)
         _, orders = tick(state, saw(seen), SKY, NOW, CONFIG)
         assert orders.extra == wanted
 
 
 def test_a_loss_with_a_fit_is_held_on_the_fit_and_without_one_on_the_elements() -> None:
     lost = status(AcuMode.REMOTE_BACKUP, is_acquired=False)
-    assert step(TrackState.AUTOTRACK_FITTED, lost, FITTED)[0].track is TrackState.HOLD_FITTED
-    assert step(TrackState.AUTOTRACK_TLE, lost)[0].track is TrackState.HOLD_TLE
+    assert step(TrackState.AUTOTRACK_FITTED, lost, FITTED)[0].tracking.track is TrackState.HOLD_FITTED
+    assert step(TrackState.AUTOTRACK_TLE, lost)[0].tracking.track is TrackState.HOLD_TLE
 
 
 @pytest.mark.parametrize(
@@ -252,56 +250,56 @@ def test_a_loss_with_a_fit_is_held_on_the_fit_and_without_one_on_the_elements() 
 def test_the_state_says_what_steers_also_when_the_elements_steer_again(
     track: TrackState, mode: AcuMode, after: TrackState
 ) -> None:
-    before = replace(ready(track, status(mode)), hold_from_tai_s=NOW - 40.0)
+    before = remembering(ready(track, status(mode)), hold_from_tai_s=NOW - 40.0)
     state, orders = tick(before, saw(status(mode)), SKY, NOW, CONFIG)
-    assert state.track is after
+    assert state.tracking.track is after
     assert "newer readings deny the fit" in str(orders.events[0].fields["cause"])
-    assert state.hold_from_tai_s == NOW - 40.0  # the loss is no younger for it
-    assert tick(before, saw(status(mode)), FITTED, NOW, CONFIG)[0].track is track
+    assert state.tracking.hold_from_tai_s == NOW - 40.0  # the loss is no younger for it
+    assert tick(before, saw(status(mode)), FITTED, NOW, CONFIG)[0].tracking.track is track
 
 
 @pytest.mark.parametrize(("sky", "after"), [(SKY, TrackState.HOLD_TLE), (FITTED, TrackState.HOLD_FITTED)])
 def test_after_a_search_the_state_names_what_it_goes_back_to(sky: Sky, after: TrackState) -> None:
-    before = replace(ready(TrackState.SEARCH, status(AcuMode.ACQUIRE)), entered_tai_s=NOW - 121.0)
-    assert tick(before, saw(status(AcuMode.ACQUIRE)), sky, NOW, CONFIG)[0].track is after
+    before = remembering(ready(TrackState.SEARCH, status(AcuMode.ACQUIRE)), entered_tai_s=NOW - 121.0)
+    assert tick(before, saw(status(AcuMode.ACQUIRE)), sky, NOW, CONFIG)[0].tracking.track is after
 
 
 @pytest.mark.parametrize("config", [CONFIG, replace(CONFIG, is_armed=False)])
 @pytest.mark.parametrize("track", [TrackState.IDLE, TrackState.ACQUIRE_TLE])
 def test_where_a_fit_steers_no_state_says_that_the_elements_do(config: ControlConfig, track: TrackState) -> None:
     state, _ = tick(ready(track, status(AcuMode.ACQUIRE)), saw(status(AcuMode.ACQUIRE)), FITTED, NOW, config)
-    assert state.track is TrackState.HOLD_FITTED
+    assert state.tracking.track is TrackState.HOLD_FITTED
 
 
 @pytest.mark.parametrize(("has_locked", "track"), [(False, TrackState.SEARCH), (True, TrackState.HOLD_TLE)])
 def test_a_signal_that_was_never_locked_is_searched_for_after_acquire_s(has_locked: bool, track: TrackState) -> None:
     lost = status(AcuMode.REMOTE_BACKUP, is_acquired=False)
     since_tai_s = NOW - CONFIG.acquire_s - 1.0
-    state = replace(ready(TrackState.HOLD_TLE, lost), has_locked=has_locked, hold_from_tai_s=since_tai_s)
-    assert tick(state, saw(lost), SKY, NOW, CONFIG)[0].track is track
+    state = remembering(ready(TrackState.HOLD_TLE, lost), has_locked=has_locked, hold_from_tai_s=since_tai_s)
+    assert tick(state, saw(lost), SKY, NOW, CONFIG)[0].tracking.track is track
 
 
 def test_silence_of_the_link_makes_everything_start_anew() -> None:
     seen = status()
-    state = replace(ready(TrackState.AUTOTRACK_FITTED, seen), is_place_sure=True)
+    state = remembering(ready(TrackState.AUTOTRACK_FITTED, seen), is_place_sure=True)
     state, orders = tick(state, Observation(silence_s=LINK_SILENCE_S + 0.01), FITTED, NOW, CONFIG)
-    assert state.track is TrackState.LINK_LOST
-    assert state.stage is Stage.NEW
-    assert not state.is_place_sure  # on a fresh connection the place of the old one is not written
+    assert state.tracking.track is TrackState.LINK_LOST
+    assert state.startup.stage is Stage.NEW
+    assert not state.intake.is_place_sure  # on a fresh connection the place of the old one is not written
     assert orders.first == Poll()
     assert orders.extra in (None, Identify())
 
 
 def test_a_signal_long_before_the_rise_is_another_satellite() -> None:
     sky = Sky(None, None, replace(PLAN, rise_tai_s=NOW + 600.0, start_tai_s=NOW + 600.0))
-    assert step(TrackState.IDLE, status(), sky)[0].track is TrackState.IDLE
+    assert step(TrackState.IDLE, status(), sky)[0].tracking.track is TrackState.IDLE
 
 
 @pytest.mark.parametrize("track", sorted(ACTIVE))
 def test_a_fault_ends_every_active_state_and_asks_once_what_it_is(track: TrackState) -> None:
     seen = status(AcuMode.FAULT, is_autotrack_selected=False)
     state, orders = step(track, seen)
-    assert state.track is TrackState.FAULT
+    assert state.tracking.track is TrackState.FAULT
     assert orders.extra == ReadFaults()
     answered = saw(seen, extra=Exchange(ReadFaults(), Faults(azimuth=1)))
     state, later = tick(state, answered, SKY, NOW, CONFIG)
@@ -314,7 +312,7 @@ def test_a_fault_detail_is_asked_for_until_it_is_answered_and_again_when_the_bit
     state, _ = step(TrackState.AUTOTRACK_FITTED, seen)
     state, orders = tick(state, saw(seen, extra=Exchange(ReadFaults(), None)), SKY, NOW + EXTRA_REPEAT_S, CONFIG)
     assert orders.extra == ReadFaults()
-    state = replace(state, extra_after_tai_s=NOW)
+    state = remembering(state, again_tai_s=NOW)
     state, orders = tick(state, saw(seen, extra=Exchange(ReadFaults(), Faults(azimuth=1))), SKY, NOW, CONFIG)
     assert orders.extra is None
     assert tick(state, saw(replace(seen, has_interlock_fault=True)), SKY, NOW, CONFIG)[1].extra == ReadFaults()
@@ -324,13 +322,13 @@ def test_a_fault_detail_is_asked_for_until_it_is_answered_and_again_when_the_bit
 def test_a_stow_from_elsewhere_ends_every_active_state_and_nothing_leaves_it(track: TrackState) -> None:
     stowing = status(AcuMode.STOWING, is_autotrack_selected=False)
     state, orders = step(track, stowing)
-    assert state.track is TrackState.STOW
+    assert state.tracking.track is TrackState.STOW
     assert orders.extra is None
     stowed = replace(stowing, mode=AcuMode.STOWED)
     for k in range(20):
         state, orders = tick(state, saw(stowed), SKY, NOW + 1.0 + k, CONFIG)
         assert orders.extra is None
-    assert state.track is TrackState.STOW
+    assert state.tracking.track is TrackState.STOW
 
 
 # Refusals
@@ -339,11 +337,11 @@ def test_a_stow_from_elsewhere_ends_every_active_state_and_nothing_leaves_it(tra
 def test_p5_what_the_gate_refuses_is_counted_every_time_and_logged_once() -> None:
     held = status(AcuMode.REMOTE_BACKUP)
     wrong = replace(FITTED, prediction=replace(path("FITTED"), el_deg=path().el_deg + np.nan))
-    state, events = replace(ready(TrackState.HOLD_FITTED, held), hold_from_tai_s=NOW), []
+    state, events = remembering(ready(TrackState.HOLD_FITTED, held), hold_from_tai_s=NOW), []
     for k, sky in enumerate([wrong, wrong, FITTED, wrong]):
         state, orders = tick(state, saw(held), sky, NOW + 0.1 * k, CONFIG)
         events.append([event.fields["reason"] for event in orders.events if event.name == "gate.refused"])
-    assert state.gate_refusal_count == 3
+    assert state.refusals.refusal_count == 3
     assert events == [["not a finite angle"], [], [], ["not a finite angle"]]
 
 
@@ -353,7 +351,7 @@ def test_p5_an_axis_outside_its_limits_is_held_there_and_the_other_one_follows(m
     held = status(mode)
     flat = replace(CONFIG, elevation=replace(CONFIG.elevation, max_deg=38.0))
     track = TrackState.HOLD_FITTED if mode is AcuMode.REMOTE_BACKUP else TrackState.AUTOTRACK_FITTED
-    state, told = replace(ready(track, held), hold_from_tai_s=NOW, axis_el=AxisState(38.0)), []
+    state, told = remembering(ready(track, held), hold_from_tai_s=NOW, axis_el=AxisState(38.0)), []
     within = replace(FITTED, prediction=replace(path("FITTED"), el_deg=path().el_deg - 5.0))
     for k in range(60):
         sky = within if 20 <= k < 25 or k >= 30 else FITTED
@@ -363,22 +361,22 @@ def test_p5_an_axis_outside_its_limits_is_held_there_and_the_other_one_follows(m
         assert orders.first.el_deg <= 38.0
         assert orders.first.az_deg == pytest.approx(AZ_DEG + AZ_RATE * (0.1 * k + LEAD_S), abs=0.1)
     assert [name for _, name in told] == ["gate.limited", "gate.within_limits"]
-    assert (state.gate_limited_count, state.gate_refusal_count) == (25, 0)
-    assert state.limited == ""
+    assert (state.refusals.limited_count, state.refusals.refusal_count) == (25, 0)
+    assert state.refusals.limited == ""
 
 
 def test_p5_what_the_gate_holds_back_is_counted() -> None:
     held = status(AcuMode.REMOTE_BACKUP)
     far = replace(FITTED, prediction=replace(path("FITTED"), follow_az_deg=path().az_deg + 3.0))
     state, _ = tick(ready(TrackState.HOLD_FITTED, held), saw(held), far, NOW, CONFIG)
-    assert (state.gate_clamped_count, state.gate_refusal_count) == (1, 0)
+    assert (state.refusals.clamped_count, state.refusals.refusal_count) == (1, 0)
 
 
 def test_p5_what_the_fence_keeps_back_is_counted_and_logged_and_a_poll_goes_in_its_place() -> None:
     state = ready(TrackState.HOLD_FITTED, status(AcuMode.REMOTE_BACKUP))
     after, orders = fence(state, Orders(WriteAndPoll(100.0, 91.0), Stow()), CONFIG)
     assert (orders.first, orders.extra) == (Poll(), None)
-    assert after.gate_refusal_count == 2
+    assert after.refusals.refusal_count == 2
     assert [event.name for event in orders.events] == ["fence.refused", "fence.refused"]
 
 
@@ -396,10 +394,13 @@ def test_a_refused_write_is_not_in_force_and_an_answered_one_is() -> None:
     seen = status()
     state, orders = step(TrackState.AUTOTRACK_FITTED, seen, FITTED)
     assert isinstance(orders.first, WriteAndPoll)
-    assert tick(state, saw(seen, refused=Nak()), FITTED, NOW + 0.1, CONFIG)[0].in_force == state.in_force
+    assert (
+        tick(state, saw(seen, refused=Nak()), FITTED, NOW + 0.1, CONFIG)[0].registers.in_force
+        == state.registers.in_force
+    )
     answered, _ = tick(state, saw(seen), FITTED, NOW + 0.1, CONFIG)
-    assert answered.in_force is not None
-    assert answered.in_force[1:] == (orders.first.az_deg, orders.first.el_deg)
+    assert answered.registers.in_force is not None
+    assert answered.registers.in_force[1:] == (orders.first.az_deg, orders.first.el_deg)
 
 
 def extras_over(refusal: Nak | None, span_s: float) -> int:
@@ -417,25 +418,27 @@ def extras_over(refusal: Nak | None, span_s: float) -> int:
 
 def test_on_a_status_from_before_an_outage_nothing_is_decided() -> None:
     seen = status(AcuMode.STANDBY)
-    stale = replace(ready(TrackState.HOLD_FITTED, seen), reading=saw(seen).reading)
+    stale = remembering(ready(TrackState.HOLD_FITTED, seen), reading=saw(seen).reading)
     for stage in (Stage.NEW, Stage.REGISTERS_KNOWN, Stage.SECTOR_FREE, Stage.READY):
-        _, orders = tick(replace(stale, stage=stage), Observation(), FITTED, NOW + LINK_SILENCE_S + 0.1, CONFIG)
+        _, orders = tick(remembering(stale, stage=stage), Observation(), FITTED, NOW + LINK_SILENCE_S + 0.1, CONFIG)
         assert orders.extra is None
         assert isinstance(orders.first, Poll | WriteAndPoll)
 
 
 def test_no_mode_is_selected_while_the_registers_are_old() -> None:
     seen = status(AcuMode.STANDBY, is_autotrack_selected=False)
-    state = replace(ready(TrackState.HOLD_FITTED, seen), entered_tai_s=NOW - 1.0, in_force=(NOW - 5.0, AZ_DEG, EL_DEG))
+    state = remembering(
+        ready(TrackState.HOLD_FITTED, seen), entered_tai_s=NOW - 1.0, in_force=(NOW - 5.0, AZ_DEG, EL_DEG)
+    )
     assert tick(state, saw(seen), FITTED, NOW, CONFIG)[1].extra is None
-    assert tick(replace(state, in_force=(NOW - 0.1, AZ_DEG, EL_DEG)), saw(seen), FITTED, NOW, CONFIG)[1].extra
+    assert tick(remembering(state, in_force=(NOW - 0.1, AZ_DEG, EL_DEG)), saw(seen), FITTED, NOW, CONFIG)[1].extra
 
 
 def test_autotrack_that_is_selected_in_standby_is_deselected_first_once_it_is_no_transient() -> None:
     seen = status(AcuMode.STANDBY, is_autotrack_selected=True)
     state = ready(TrackState.HOLD_FITTED, seen)
     assert tick(state, saw(seen), FITTED, NOW, CONFIG)[1].extra == SelectMode(AcuMode.STANDBY)
-    assert tick(replace(state, extra_after_tai_s=NOW), saw(seen), FITTED, NOW, CONFIG)[1].extra is None
+    assert tick(remembering(state, again_tai_s=NOW), saw(seen), FITTED, NOW, CONFIG)[1].extra is None
 
 
 def test_a_refused_extra_is_repeated_far_more_rarely_than_a_lost_one() -> None:
@@ -479,8 +482,8 @@ def check_allowed(command: Command | None, seen: Status) -> None:
 
 def test_registers_read_back_wrong_are_written_again_before_any_mode() -> None:
     seen = status(AcuMode.STANDBY)
-    state = replace(ready(TrackState.IDLE, seen), stage=Stage.PRESENT_WRITTEN, present_deg=(AZ_DEG, EL_DEG))
+    state = remembering(ready(TrackState.IDLE, seen), stage=Stage.PRESENT_WRITTEN, present_deg=(AZ_DEG, EL_DEG))
     wrong = Exchange(ReadRegisters(), Registers(AZ_DEG + 5.0, EL_DEG, 0, 3))
     state, orders = tick(state, saw(seen, extra=wrong), FITTED, NOW, CONFIG)
-    assert state.stage is Stage.SECTOR_FREE
+    assert state.startup.stage is Stage.SECTOR_FREE
     assert isinstance(orders.first, WriteRegisters)

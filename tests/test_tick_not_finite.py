@@ -10,12 +10,15 @@ import pytest
 from flights import RISING_TAI_S, climb, demo_target, events_named, worst_error_deg
 from hypothesis import given
 from hypothesis import strategies as st
+from memories import remembering
 from test_tick import CONFIG, FITTED, NOW, PLAN, ready, saw, status
 
+from acu_daemon.control.orders import Orders
 from acu_daemon.control.refit import RefitReply, RefitRequest
-from acu_daemon.control.state import ControlState, Observation, Orders, PathOffset, Sky, Stage
+from acu_daemon.control.state import ControlState, PathOffset, Stage
 from acu_daemon.control.states import TrackState
 from acu_daemon.control.tick import tick
+from acu_daemon.control.tick_input import Observation, Sky
 from acu_daemon.edge.fit import InlineFitRunner
 from acu_daemon.model import Correction, FitResult, Model
 from acu_daemon.pointing.axis import AxisState
@@ -52,7 +55,7 @@ def seen_in(mode: AcuMode) -> Observation:
 
 def memory(track: TrackState, mode: AcuMode) -> ControlState:
     state = ready(track, status(mode))
-    return replace(state, axis_az=AxisState(100.0), axis_el=AxisState(40.0), hold_from_tai_s=NOW)
+    return remembering(state, axis_az=AxisState(100.0), axis_el=AxisState(40.0), hold_from_tai_s=NOW)
 
 
 INPUTS = {"seen": seen_in(AcuMode.AUTOTRACK), "sky": SKY}
@@ -76,7 +79,7 @@ def check(orders: Orders) -> None:
 )
 def test_p5_one_field_that_is_not_finite_never_raises_and_never_reaches_a_command(where, bad, track, mode, stage):
     name, path = where
-    state = replace(memory(track, mode), stage=stage)
+    state = remembering(memory(track, mode), stage=stage)
     for k in range(4):
         seen, sky = seen_in(mode), SKY
         if k in (1, 2):
@@ -91,7 +94,7 @@ def test_p5_without_a_finite_time_it_polls(bad, track):
     state, orders = tick(memory(track, AcuMode.AUTOTRACK), seen_in(AcuMode.AUTOTRACK), SKY, bad, CONFIG)
     check(orders)
     assert not isinstance(orders.first, WriteAndPoll)
-    assert state.gate_refusal_count == 1
+    assert state.refusals.refusal_count == 1
 
 
 @pytest.mark.parametrize("bad", NOT_FINITE[:3])
@@ -102,7 +105,7 @@ def test_p5_a_prediction_that_is_not_finite_is_refused_and_counted_and_the_last_
     sky = spoiled(SKY, ("prediction", field), bad)
     state, orders = tick(state, seen_in(mode), sky, NOW + 0.1, CONFIG)
     assert orders.first == first.first
-    assert state.gate_refusal_count == 1
+    assert state.refusals.refusal_count == 1
     assert [event.name for event in orders.events] == ["gate.refused"]
     state, orders = tick(state, seen_in(mode), SKY, NOW + 0.2, CONFIG)
     assert isinstance(orders.first, WriteAndPoll)
@@ -114,19 +117,20 @@ def test_p5_a_status_that_is_not_finite_is_not_taken_and_the_last_one_stays(path
     mode = AcuMode.AUTOTRACK
     before = memory(TrackState.AUTOTRACK_FITTED, mode)
     state, orders = tick(before, spoiled(seen_in(mode), path, nan), SKY, NOW, CONFIG)
-    assert (state.status, state.az_deg, state.gate_refusal_count) == (before.status, before.az_deg, 1)
+    assert (state.intake.status, state.intake.az_deg) == (before.intake.status, before.intake.az_deg)
+    assert state.refusals.refusal_count == 1
     assert orders.events[0].fields == {"input": "status", "reason": "not finite"}
 
 
 @pytest.mark.parametrize("place", ["along_s", "across_deg"])
 def test_p5_an_offset_that_is_not_finite_reaches_no_command(place):
     offset = replace(PathOffset(0.1, 0.1, SKY.prediction.model), **{place: nan})
-    state = replace(memory(TrackState.HOLD_TLE, AcuMode.REMOTE_BACKUP), offset=offset)
+    state = remembering(memory(TrackState.HOLD_TLE, AcuMode.REMOTE_BACKUP), offset=offset)
     sky = replace(SKY, prediction=replace(SKY.prediction, model=Model.ELEMENTS), fit=None)
     seen = saw(replace(status(AcuMode.REMOTE_BACKUP), is_acquired=False))
     state, orders = tick(state, seen, sky, NOW, CONFIG)
     check(orders)
-    assert state.gate_refusal_count == 1
+    assert state.refusals.refusal_count == 1
 
 
 class Spoiling(InlineFitRunner):

@@ -10,17 +10,11 @@ from random import Random
 import numpy as np
 from fake_sky import START_TAI_S, Star
 
-from acu_daemon.control.state import (
-    ControlConfig,
-    ControlState,
-    Exchange,
-    Observation,
-    Orders,
-    PassPlan,
-    Request,
-    Sky,
-)
+from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.orders import Orders
+from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick import tick
+from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Request, Sky
 from acu_daemon.model import AxisLimits, Correction, FitResult, Model, Prediction, Reading
 from acu_daemon.protocol.messages import AcuMode, Nak, SelectMode, Status, Stop, Stow
 from acu_daemon.sim.acu import FakeAcu

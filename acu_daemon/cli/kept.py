@@ -13,7 +13,7 @@ from acu_daemon.assist.carry_over import CarryOver, carry_over_of, resume_of, wh
 from acu_daemon.assist.estimator import has_covariance
 from acu_daemon.cli.options import Target
 from acu_daemon.config import estimator_settings
-from acu_daemon.control.state import ControlState, Held
+from acu_daemon.control.state import ControlState, Held, remembered
 from acu_daemon.edge.carry_over import FitKeeper, carry_over_path, read_carry_over
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.latch import DISARMED, LATCH, LatchKeeper, read_latch
@@ -45,8 +45,8 @@ class Kept:
 
     def see(self, state: ControlState) -> None:
         """Take the memory of a tick."""
-        self.latches.see(state.latch)
-        self.disarms.see(state.disarmed_by)
+        self.latches.see(state.latch.problem)
+        self.disarms.see(state.arming.disarmed_by)
         self.run_state.see(state)
 
     @property
@@ -84,7 +84,7 @@ def open_kept(
         rise_tai_s=coming.rise_tai_s,
         set_tai_s=coming.set_tai_s,
         clock_s=clock_s,
-        arming=state.arming,
+        arming=state.arming.by_people,
         fit=resumed,
     )
     return Kept(
@@ -105,11 +105,11 @@ def _first_with(name: str, directory: Path, older: Sequence[Path]) -> Path:
 def _first_state(left: RunState, latch: str, disarmed_by: str) -> ControlState:
     """What the decision begins with; left: of this pass."""
     is_disarmed = bool(disarmed_by) or left.arming is False
-    return ControlState(
-        arming=False if is_disarmed else left.arming,
+    return remembered(
+        by_people=False if is_disarmed else left.arming,
         disarmed_by=disarmed_by or ("a person, before the restart" if is_disarmed else ""),
-        latch=latch,
         is_stop_due=left.held is not None if is_disarmed else bool(latch),  # disarmed it is held until STOP
+        latch=latch,
         held=None if left.held is None else Held(left.held),
         is_stow_kept=left.is_stow_kept,
     )

@@ -6,8 +6,10 @@
 from dataclasses import dataclass
 from math import sqrt
 
+from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.gate import CHASE_ACCELERATION_MARGIN, CHASE_RATE_MARGIN
-from acu_daemon.control.state import ControlConfig, ControlState, PassPlan
+from acu_daemon.control.state import ControlState
+from acu_daemon.control.tick_input import PassPlan
 from acu_daemon.model import AxisLimits
 
 ACQUIRE_LEAD_S = 20.0  # autotrack may be selected this long before the rise
@@ -39,10 +41,9 @@ def way_s(distance_deg: float, axis: AxisLimits) -> float:
 
 def way_to(plan: PassPlan, state: ControlState, config: ControlConfig) -> Way:
     """From where the antenna stands to the point where the pass begins, on the turn of the plan."""
-    el_deg = state.status.el_deg if state.status is not None else plan.start_el_deg
-    return Way(
-        way_s(plan.start_az_deg - state.az_deg, config.azimuth), way_s(plan.start_el_deg - el_deg, config.elevation)
-    )
+    el_deg = state.intake.status.el_deg if state.intake.status is not None else plan.start_el_deg
+    way_az_deg, way_el_deg = plan.start_az_deg - state.intake.az_deg, plan.start_el_deg - el_deg
+    return Way(way_s(way_az_deg, config.azimuth), way_s(way_el_deg, config.elevation))
 
 
 def lead_s(plan: PassPlan, state: ControlState, config: ControlConfig) -> float:

@@ -4,9 +4,11 @@ from dataclasses import replace
 from math import cos, hypot, isfinite, radians
 
 from acu_daemon.control.approach import ACQUIRE_LEAD_S, lead_s
+from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.gate import within_limits
-from acu_daemon.control.state import ControlConfig, ControlState, PassPlan, Sky, Stage
+from acu_daemon.control.state import ControlState, Stage
 from acu_daemon.control.states import AUTOTRACKING, HOLDING, Cause, TrackState
+from acu_daemon.control.tick_input import PassPlan, Sky
 from acu_daemon.control.track_frame import extents, is_within, offset_of
 from acu_daemon.model import Pointing, sky_angle_deg
 from acu_daemon.pointing.wrap import nearest_turn
@@ -30,20 +32,20 @@ def is_tracked(state: ControlState, sky: Sky, now_tai_s: float) -> bool:
     """Whether this pass is held, or has been: then what was seen of it counts for more than another clock."""
     plan = sky.plan
     is_in_pass = plan is not None and plan.rise_tai_s - ACQUIRE_LEAD_S <= now_tai_s <= pass_end_tai_s(plan, sky)
-    return state.track in AUTOTRACKING or sky.fit is not None or (is_in_pass and state.has_acquired)
+    return state.tracking.track in AUTOTRACKING or sky.fit is not None or (is_in_pass and state.signal.has_acquired)
 
 
 def find_causes(state: ControlState, sky: Sky, silence_s: float, now_tai_s: float, config: ControlConfig) -> set[Cause]:
     """All causes that are present; the table decides which of them matters."""
-    status = state.status
+    status = state.intake.status
     if silence_s > LINK_SILENCE_S or status is None:
         return {Cause.LINK_SILENT}
-    if state.latch:
+    if state.latch.problem:
         return {Cause.LINK_BACK, Cause.LATCHED}
-    causes = {Cause.LINK_BACK} | _of_status(status, is_stow_kept=state.is_stow_kept)
+    causes = {Cause.LINK_BACK} | _of_status(status, is_stow_kept=state.intake.is_stow_kept)
     if not state.is_armed(config):
         return causes | _of_others(state, status, sky, now_tai_s, config)
-    if state.stage is Stage.READY:
+    if state.startup.stage is Stage.READY:
         causes |= _of_signal(state, status, sky, now_tai_s, config)
         causes |= _of_plan(state, status, sky, now_tai_s, config)
         causes |= _of_time(state, sky, now_tai_s, config)
@@ -84,7 +86,7 @@ def _of_signal(state: ControlState, status: Status, sky: Sky, now_tai_s: float, 
     if is_acquired(status):
         if _is_ours(state, status, sky, now_tai_s, config):
             causes.add(Cause.ACQUIRED_FITTED if has_fit else Cause.ACQUIRED)
-        if has_fit and state.track is TrackState.HOLD_FITTED:
+        if has_fit and state.tracking.track is TrackState.HOLD_FITTED:
             causes.add(Cause.ACQUIRED)
     else:
         causes.add(Cause.LOST)
@@ -95,14 +97,16 @@ def _is_ours(state: ControlState, status: Status, sky: Sky, now_tai_s: float, co
     """Whether what autotrack holds can be this pass: late enough, and where it was found so, near the path."""
     if sky.plan is None or now_tai_s < sky.plan.rise_tai_s - ACQUIRE_LEAD_S:
         return False
-    if state.track not in BEFORE:
+    if state.tracking.track not in BEFORE:
         return True
     target = path_point(sky, now_tai_s)
     if target is None or not target.is_finite:
         return True
     if sky.prediction is None or _distance_deg(state, status, target) < RESUME_DEG:
         return True
-    return is_within(offset_of(sky.prediction, now_tai_s, state.az_deg, status.el_deg), extents(sky.prediction, config))
+    return is_within(
+        offset_of(sky.prediction, now_tai_s, state.intake.az_deg, status.el_deg), extents(sky.prediction, config)
+    )
 
 
 def _of_plan(state: ControlState, status: Status, sky: Sky, now_tai_s: float, config: ControlConfig) -> set[Cause]:
@@ -114,7 +118,7 @@ def _of_plan(state: ControlState, status: Status, sky: Sky, now_tai_s: float, co
     causes: set[Cause] = set()
     if sky.prediction is not None and now_tai_s >= plan.rise_tai_s - lead_s(plan, state, config):
         causes.add(Cause.PASS_NEAR)
-    if state.track in BEFORE and now_tai_s >= plan.rise_tai_s - ACQUIRE_LEAD_S:
+    if state.tracking.track in BEFORE and now_tai_s >= plan.rise_tai_s - ACQUIRE_LEAD_S:
         target = path_point(sky, now_tai_s)
         if target is not None and target.is_finite:
             is_in_pass = now_tai_s >= plan.rise_tai_s
@@ -126,7 +130,7 @@ def _reached(target: Pointing, state: ControlState, config: ControlConfig) -> Po
     """As near to the path as the limits of the axes allow."""
     az_deg = nearest_turn(target.az_deg, target.az_deg, config.azimuth)
     target = target if az_deg is None else replace(target, az_deg=az_deg)
-    return within_limits(target, state.az_deg, config)[0]
+    return within_limits(target, state.intake.az_deg, config)[0]
 
 
 def _of_place(
@@ -139,7 +143,7 @@ def _of_place(
     """
     has_fit = sky.prediction is not None and sky.prediction.kind == "FITTED"
     distance_deg = _distance_deg(state, status, target)
-    is_on_turn = abs(state.az_deg - target.az_deg) < 90.0
+    is_on_turn = abs(state.intake.az_deg - target.az_deg) < 90.0
     is_there = status.mode is AcuMode.REMOTE and is_on_turn and distance_deg < ON_POINT_BEAMS * config.beamwidth_deg
     is_heard = is_in_pass and not is_on_turn and status.is_acquired and status.mode in (AcuMode.REMOTE, AcuMode.STANDBY)
     causes: set[Cause] = set()
@@ -165,13 +169,13 @@ def path_point(sky: Sky, tai_s: float, *, follow: bool = True) -> Pointing | Non
 def _distance_deg(state: ControlState, status: Status, target: Pointing) -> float:
     """Angle on the sky between antenna and path, less what the path moved since the reading."""
     lag_deg = 0.15 * hypot(target.az_rate_deg_s * cos(radians(target.el_deg)), target.el_rate_deg_s)
-    return sky_angle_deg(state.az_deg, status.el_deg, target.az_deg, target.el_deg) - lag_deg
+    return sky_angle_deg(state.intake.az_deg, status.el_deg, target.az_deg, target.el_deg) - lag_deg
 
 
 def _of_time(state: ControlState, sky: Sky, now_tai_s: float, config: ControlConfig) -> set[Cause]:
-    in_state_s = now_tai_s - state.entered_tai_s
+    in_state_s = now_tai_s - state.tracking.entered_tai_s
     causes: set[Cause] = set()
-    status = state.status
+    status = state.intake.status
     if (
         status is not None
         and in_state_s > MODE_SETTLE_S
@@ -179,15 +183,17 @@ def _of_time(state: ControlState, sky: Sky, now_tai_s: float, config: ControlCon
         and status.mode in (AcuMode.STANDBY, AcuMode.REMOTE)
     ):
         causes.add(Cause.MODE_LEFT)
-    if state.track is TrackState.ACQUIRE_TLE and sky.plan is not None:
-        waiting_s = now_tai_s - max(state.entered_tai_s, sky.plan.rise_tai_s)
+    if state.tracking.track is TrackState.ACQUIRE_TLE and sky.plan is not None:
+        waiting_s = now_tai_s - max(state.tracking.entered_tai_s, sky.plan.rise_tai_s)
         if waiting_s > config.acquire_s:
             causes.add(Cause.ACQUIRE_OVER)
-    is_glimpse = state.track is TrackState.HOLD_TLE and not state.has_locked  # it has shown nothing worth a long hold
+    is_glimpse = (
+        state.tracking.track is TrackState.HOLD_TLE and not state.signal.has_locked
+    )  # it has shown nothing worth a long hold
     hold_s = min(config.hold_s, config.acquire_s) if is_glimpse else config.hold_s
-    if state.track in HOLDING and now_tai_s - state.hold_from_tai_s > hold_s:
+    if state.tracking.track in HOLDING and now_tai_s - state.tracking.hold_from_tai_s > hold_s:
         causes.add(Cause.HOLD_OVER)
-    if state.track is TrackState.SEARCH and in_state_s > config.search_s:
+    if state.tracking.track is TrackState.SEARCH and in_state_s > config.search_s:
         has_fit = sky.prediction is not None and sky.prediction.kind == "FITTED"
         causes.add(Cause.SEARCH_OVER_FITTED if has_fit else Cause.SEARCH_OVER)
     return causes

@@ -31,8 +31,13 @@ class EncoderWatch:
         return "elevation encoder frozen" if abs(self.el_moved_deg) > FROZEN_DEG else ""
 
 
-def watch_encoders(watch: EncoderWatch, tai_s: float, status: Status, path: Pointing) -> EncoderWatch:
-    """Take one more reading in autotrack, and the path at its time; an axis at its limit may well stand."""
+def watch_encoders(watch: EncoderWatch, tai_s: float, status: Status, path: Pointing | None) -> EncoderWatch:
+    """Take one more reading, and the path at its time; an axis at its limit may well stand.
+
+    path: of the satellite that autotrack holds; None: it holds none, and the watch begins anew.
+    """
+    if path is None:
+        return EncoderWatch()
     span_s = tai_s - watch.tai_s if watch.tai_s is not None else 0.0
     is_az_same = watch.tai_s is not None and status.az_deg == watch.az_deg and not any(az_ends(status))
     is_el_same = watch.tai_s is not None and status.el_deg == watch.el_deg and not any(el_ends(status))

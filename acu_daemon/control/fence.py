@@ -6,9 +6,11 @@ stage, arming, latch and limits allow it, and what it keeps back is an error of 
 
 from math import isfinite
 
-from acu_daemon.control.changed import changed
+from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.orders import Event, Orders
+from acu_daemon.control.registers import count_refusals
 from acu_daemon.control.start import SECTOR, WATCHDOG
-from acu_daemon.control.state import ControlConfig, ControlState, Event, Orders, Stage
+from acu_daemon.control.state import ControlState, Stage
 from acu_daemon.protocol.angles import LSB_DEG
 from acu_daemon.protocol.messages import (
     AcuMode,
@@ -42,8 +44,7 @@ def fence(state: ControlState, orders: Orders, config: ControlConfig) -> tuple[C
     for command, reason in ((orders.first, first_refusal), (orders.extra, extra_refusal)):
         if command is not None and reason:
             events.append(Event("fence.refused", {"command": command_text(command), "reason": reason}, is_warning=True))
-    count = state.gate_refusal_count + bool(first_refusal) + bool(extra_refusal)
-    return changed(state, gate_refusal_count=count), Orders(
+    return count_refusals(state, bool(first_refusal) + bool(extra_refusal)), Orders(
         Poll() if first_refusal else orders.first, None if extra_refusal else orders.extra, tuple(events)
     )
 
@@ -56,27 +57,27 @@ def refusal(command: Command, state: ControlState, config: ControlConfig) -> str
         return "a shadow commands nothing"
     if isinstance(command, Stop) or command == WriteParameter(WATCHDOG, 0):
         return ""
-    if state.latch:
-        return f"latched: {state.latch}"
+    if state.latch.problem:
+        return f"latched: {state.latch.problem}"
     if not state.is_armed(config):
         return "disarmed"
-    if state.status is None or not state.status.is_remote_enabled:
+    if state.intake.status is None or not state.intake.status.is_remote_enabled:
         return "the local panel has control"
     return _of_kind(command, state, config)
 
 
 def _of_kind(command: Command, state: ControlState, config: ControlConfig) -> str:
-    is_ready = state.stage is Stage.READY
+    is_ready = state.startup.stage is Stage.READY
     match command:
         case WriteAndPoll(az_deg=az_deg, el_deg=el_deg) if is_ready:
             return _of_angles(az_deg, el_deg, config)
-        case WriteRegisters(az_deg=az_deg, el_deg=el_deg) if state.stage >= Stage.SECTOR_FREE:
+        case WriteRegisters(az_deg=az_deg, el_deg=el_deg) if state.startup.stage >= Stage.SECTOR_FREE:
             return _of_angles(az_deg, el_deg, config)
         case SelectMode(mode=mode) if is_ready and mode in SELECTED_MODES:
             return ""
         case SelectBackup(backup=Backup.REMOTE) if is_ready:
             return ""
-        case WriteParameter(name=name) if name in (SECTOR, WATCHDOG) and state.stage >= Stage.REGISTERS_KNOWN:
+        case WriteParameter(name=name) if name in (SECTOR, WATCHDOG) and state.startup.stage >= Stage.REGISTERS_KNOWN:
             return ""
     return "not in its place"
 

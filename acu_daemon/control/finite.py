@@ -7,7 +7,7 @@ that are not finite (`Pointing.is_finite`): the gate refuses them, and the last 
 from math import inf, isnan
 
 from acu_daemon.control.changed import changed
-from acu_daemon.control.state import Observation, PassPlan, Sky
+from acu_daemon.control.tick_input import Observation, PassPlan, Sky
 from acu_daemon.model import MOST_DEG, FitResult, Prediction, Reading
 from acu_daemon.protocol.messages import Status
 

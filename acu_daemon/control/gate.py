@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import copysign, cos, isfinite, radians
 
-from acu_daemon.control.state import ControlConfig, ControlState
+from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.state import ControlState
 from acu_daemon.model import AxisLimits, Pointing
 from acu_daemon.pointing.axis import AxisState, step
 from acu_daemon.pointing.wrap import nearest_end_deg
@@ -95,16 +96,17 @@ def _from(state: ControlState, now_tai_s: float, *, is_followed: bool) -> tuple[
     """Where a followed register starts from: the last command, or the antenna when it is not there."""
     az, el = _antenna(state, now_tai_s)
     return (
-        _anchor(state.axis_az, az, begins=is_followed and not state.was_followed),
-        _anchor(state.axis_el, el, begins=is_followed and not state.was_followed),
+        _anchor(state.registers.axis_az, az, begins=is_followed and not state.registers.was_followed),
+        _anchor(state.registers.axis_el, el, begins=is_followed and not state.registers.was_followed),
     )
 
 
 def _antenna(state: ControlState, now_tai_s: float) -> tuple[AxisState, AxisState]:
     """Where the antenna is now and how fast it moves, from the last half second of readings."""
-    if not state.track_of_readings:
-        return AxisState(state.az_deg), AxisState(state.status.el_deg if state.status is not None else 0.0)
-    first, last = state.track_of_readings[0], state.track_of_readings[-1]
+    intake = state.intake
+    if not intake.track_of_readings:
+        return AxisState(intake.az_deg), AxisState(intake.status.el_deg if intake.status is not None else 0.0)
+    first, last = intake.track_of_readings[0], intake.track_of_readings[-1]
     span_s, age_s = last[0] - first[0], now_tai_s - last[0]
     if not (0.0 < span_s < FRESH_S and age_s < FRESH_S):
         return AxisState(last[1]), AxisState(last[2])

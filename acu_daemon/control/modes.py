@@ -14,16 +14,16 @@ def wanted_mode_command(state: ControlState, *, is_settled: bool) -> Command | N
     The backup comes before the mode, and the registers are written before either (ICD section 5).
     is_settled: nothing was commanded for a while, so that what the status says of the mode is no transient.
     """
-    status = state.status
+    status = state.intake.status
     if status is None:
         return None
-    if state.track is not TrackState.PREPOSITION and state.track not in UNDER_AUTOTRACK:
+    if state.tracking.track is not TrackState.PREPOSITION and state.tracking.track not in UNDER_AUTOTRACK:
         return None
     is_stuck = status.mode is AcuMode.STANDBY and status.is_autotrack_selected  # selected again, it would not change
     if status.mode is AcuMode.STOWED or (is_stuck and is_settled):
         return STANDBY
     if status.backup_selected is not Backup.REMOTE:
         return SelectBackup(Backup.REMOTE)
-    if state.track is TrackState.PREPOSITION:
+    if state.tracking.track is TrackState.PREPOSITION:
         return SelectMode(AcuMode.REMOTE) if status.mode is not AcuMode.REMOTE else None
     return SelectMode(AcuMode.AUTOTRACK) if not status.is_autotrack_selected else None

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 from acu_daemon.control.causes import path_point
 from acu_daemon.control.path_offset import learned_point
-from acu_daemon.control.state import ControlState, Sky
+from acu_daemon.control.state import ControlState
 from acu_daemon.control.states import ACTIVE, TrackState
+from acu_daemon.control.tick_input import Sky
 from acu_daemon.model import Model, sky_angle_deg
 
 MADE_FROM = {Model.NEW_FIT: "fit", Model.LAST_PASS: "last pass's fit", Model.ELEMENTS: "elements"}
@@ -28,12 +29,12 @@ def off_path(state: ControlState, sky: Sky) -> OffPath | None:
 
     Before the rise the path stands still where the pass begins.
     """
-    reading = state.reading
-    if reading is None or state.track not in ACTIVE:
+    reading = state.intake.reading
+    if reading is None or state.tracking.track not in ACTIVE:
         return None
     made_from = MADE_FROM[sky.prediction.model] if sky.prediction is not None else MADE_FROM[Model.ELEMENTS]
     point = None
-    if state.track is not TrackState.PREPOSITION:
+    if state.tracking.track is not TrackState.PREPOSITION:
         point = learned_point(state, sky, reading.tai_s, follow=False)
     if point is not None:
         made_from += ", moved to the signal"

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from acu_daemon.control.state import PassPlan
+from acu_daemon.control.tick_input import PassPlan
 from acu_daemon.model import AxisLimits, Pass, Site
 from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.propagator import Propagator

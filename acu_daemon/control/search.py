@@ -16,7 +16,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import ceil, cos, hypot, radians
 
-from acu_daemon.control.state import ControlConfig, Scan
+from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.state import Scan
 from acu_daemon.control.track_frame import beside, extents, offset_of, three_sigma_of
 from acu_daemon.model import AxisLimits, Pointing, Prediction, Reading
 from acu_daemon.pointing.wrap import nearest_turn

@@ -1,11 +1,17 @@
-"""SEARCH within the tick: the scan goes on while the state lasts, is kept beyond it, and is told.  Pure."""
+"""SEARCH within the tick: the scan goes on while the state lasts, is kept beyond it, and is told.  Pure.
+
+Owner of `Search`.
+"""
 
 from dataclasses import replace
 
 from acu_daemon.control.changed import changed
+from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.orders import Event
 from acu_daemon.control.search import covered_text, go_on, needed_s
-from acu_daemon.control.state import ControlConfig, ControlState, Event, Observation, Scan, Sky
+from acu_daemon.control.state import ControlState, Scan, Search
 from acu_daemon.control.states import AUTOTRACKING, TrackState
+from acu_daemon.control.tick_input import Observation, Sky
 from acu_daemon.control.track_frame import extents
 from acu_daemon.model import Prediction
 
@@ -25,26 +31,34 @@ def search(
 
     A search without success goes on where it was when it comes again.  Once the satellite was found it is a new one.
     """
-    was_searching, is_searching = before.track is TrackState.SEARCH, state.track is TrackState.SEARCH
+    was_searching, is_searching = before.tracking.track is TrackState.SEARCH, state.tracking.track is TrackState.SEARCH
     if was_searching and not is_searching:
-        fields = {"covered": covered_text(state.scan, sky.prediction, config), "is_found": state.track in AUTOTRACKING}
+        fields = {
+            "covered": covered_text(state.search.scan, sky.prediction, config),
+            "is_found": state.tracking.track in AUTOTRACKING,
+        }
         events.append(Event("search.ended", fields))
-    if state.track in AUTOTRACKING:
-        return changed(state, scan=Scan()) if state.scan != Scan() else state
-    reading = state.reading
+    if state.tracking.track in AUTOTRACKING:
+        return forget_search(state) if state.search.scan != Scan() else state
+    reading = state.intake.reading
     if not is_searching or sky.prediction is None or reading is None:
         return state
     if not was_searching:
-        state = changed(state, scan=replace(state.scan, is_aimed=False), scanned_tai_s=reading.tai_s)
-        events.append(_begins(state.scan, sky.prediction, now_tai_s, config))
-    dt_s = reading.tai_s - state.scanned_tai_s
+        state = changed(state, search=Search(replace(state.search.scan, is_aimed=False), reading.tai_s))
+        events.append(_begins(state.search.scan, sky.prediction, now_tai_s, config))
+    dt_s = reading.tai_s - state.search.scanned_tai_s
     if was_searching and (dt_s == 0.0 or not seen.is_in_step):
         return state
-    scan = go_on(state.scan, sky.prediction, reading, now_tai_s, dt_s if dt_s < LONGEST_STEP_S else 0.0, config)
-    if scan.round_count > state.scan.round_count:
-        fields = {"covered": covered_text(state.scan, sky.prediction, config), "action": "begun again"}
+    scan = go_on(state.search.scan, sky.prediction, reading, now_tai_s, dt_s if dt_s < LONGEST_STEP_S else 0.0, config)
+    if scan.round_count > state.search.scan.round_count:
+        fields = {"covered": covered_text(state.search.scan, sky.prediction, config), "action": "begun again"}
         events.append(Event("search.covered", fields, is_warning=True))
-    return changed(state, scan=scan, scanned_tai_s=reading.tai_s)
+    return changed(state, search=Search(scan, reading.tai_s))
+
+
+def forget_search(state: ControlState) -> ControlState:
+    """The next search begins at the path."""
+    return changed(state, search=changed(state.search, scan=Scan()))
 
 
 def _begins(scan: Scan, prediction: Prediction, now_tai_s: float, config: ControlConfig) -> Event:

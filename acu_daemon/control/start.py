@@ -3,14 +3,19 @@
 Poll, identify, read the registers (for the tilt), free the sector preference, write the present angles, read them back.
 Only then is a path written or a mode selected, and the register watchdog set.  Disarmed, it stops before the first
 write.  An ACU that refuses to have its parameters read or written is taken as it is, with a warning.
+
+Owner of `Startup`.
 """
 
-from acu_daemon.control.axis_watch import AxesWatch
 from acu_daemon.control.changed import changed
-from acu_daemon.control.state import ControlConfig, ControlState, Event, Exchange, Stage, Watchdog
+from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.orders import Event
+from acu_daemon.control.state import ControlState, Stage, Startup, Watchdog
+from acu_daemon.control.tick_input import Exchange
 from acu_daemon.protocol.angles import LSB_DEG, clamp_deg
 from acu_daemon.protocol.messages import (
     Ack,
+    Backup,
     Command,
     Identify,
     Identity,
@@ -20,6 +25,7 @@ from acu_daemon.protocol.messages import (
     ReadRegisters,
     Registers,
     SelectBackup,
+    Status,
     Stop,
     WriteParameter,
     WriteRegisters,
@@ -34,38 +40,58 @@ WATCHDOG_TRY_S = 2.0  # without the answer that is hoped for, and the ACU counts
 
 def next_command(state: ControlState, config: ControlConfig) -> Command | None:
     """The exchange that brings the start one step further; None when it waits or is done."""
-    if state.stage is Stage.NEW:
+    startup, status, asked = state.startup, state.intake.status, state.asked.command
+    if startup.stage is Stage.NEW:
         return Identify()
-    if state.stage is Stage.IDENTIFIED:
+    if startup.stage is Stage.IDENTIFIED:
         return ReadRegisters()
-    if state.latch or not state.is_armed(config) or state.status is None or not state.status.is_remote_enabled:
+    if state.latch.problem or not state.is_armed(config) or status is None or not status.is_remote_enabled:
         return None
-    if state.stage is Stage.REGISTERS_KNOWN:
-        return WriteParameter(SECTOR, 0) if state.last_extra == ReadParameter(SECTOR) else ReadParameter(SECTOR)
-    if state.stage is Stage.SECTOR_FREE:
-        return WriteRegisters(*_present(state, config)) if state.is_place_sure else None
-    if state.stage is Stage.PRESENT_WRITTEN:
+    if startup.stage is Stage.REGISTERS_KNOWN:
+        return WriteParameter(SECTOR, 0) if asked == ReadParameter(SECTOR) else ReadParameter(SECTOR)
+    if startup.stage is Stage.SECTOR_FREE:
+        return WriteRegisters(*_present(state, config)) if state.intake.is_place_sure else None
+    if startup.stage is Stage.PRESENT_WRITTEN:
         return ReadRegisters()
-    if config.register_watchdog_s > 0.0 and state.watchdog is Watchdog.UNKNOWN:
-        if state.last_extra == ReadParameter(WATCHDOG):
+    if config.register_watchdog_s > 0.0 and startup.watchdog is Watchdog.UNKNOWN:
+        if asked == ReadParameter(WATCHDOG):
             return WriteParameter(WATCHDOG, watchdog_code(config))
         return ReadParameter(WATCHDOG)
     return None
 
 
-def anew(state: ControlState) -> ControlState:
-    """Before the next write the present angles are written, as at a start."""
-    return changed(
-        state,
-        stage=min(state.stage, Stage.REGISTERS_KNOWN),
-        last_extra=None,
-        axis_az=None,
-        axis_el=None,
-        was_followed=False,
-        axes=AxesWatch(),
-        watchdog=state.watchdog if state.watchdog is Watchdog.REFUSED else Watchdog.UNKNOWN,
-        is_stop_doubted=False,
-    )
+def begin_again(state: ControlState, *, keeps_watchdog: bool) -> ControlState:
+    """Free the sector preference and write the present angles again; who the ACU is, is known.
+
+    keeps_watchdog: it stays as it is set.  Else it is set again, but where the ACU has none.
+    """
+    startup = state.startup
+    is_kept = keeps_watchdog or startup.watchdog is Watchdog.REFUSED
+    watchdog = startup.watchdog if is_kept else Watchdog.UNKNOWN
+    return changed(state, startup=changed(startup, stage=min(startup.stage, Stage.REGISTERS_KNOWN), watchdog=watchdog))
+
+
+def begin_after_lost_link(state: ControlState) -> ControlState:
+    """Begin with the first question; the watchdog, where it was set, is set again."""
+    startup = changed(state.startup, stage=Stage.NEW, watchdog=_unset(state.startup), watchdog_from_tai_s=None)
+    return changed(state, startup=startup)
+
+
+def watch_for_power_cycle(state: ControlState, status: Status) -> ControlState:
+    """A backup that changed by itself shows a power cycle.
+
+    Then the registers, the tilt among them, are read again, and the watchdog is off.
+    """
+    before = state.intake.status
+    was_remote = before is not None and before.backup_selected is Backup.REMOTE
+    if state.startup.stage is not Stage.READY or not was_remote or status.backup_selected is Backup.REMOTE:
+        return state
+    startup = changed(state.startup, stage=Stage.IDENTIFIED, watchdog=_unset(state.startup))
+    return changed(state, startup=startup)
+
+
+def _unset(startup: Startup) -> Watchdog:
+    return Watchdog.UNKNOWN if startup.watchdog is Watchdog.SET else startup.watchdog
 
 
 def watchdog_code(config: ControlConfig) -> int:
@@ -75,8 +101,8 @@ def watchdog_code(config: ControlConfig) -> int:
 
 def _present(state: ControlState, config: ControlConfig) -> tuple[float, float]:
     """Where the ends of the range have one bearing, within a code of it that bearing: both ends are it, and reached."""
-    el_deg = state.status.el_deg if state.status else 0.0
-    az_deg, ends_deg = state.az_deg, (config.azimuth.min_deg, config.azimuth.max_deg)
+    el_deg = state.intake.status.el_deg if state.intake.status else 0.0
+    az_deg, ends_deg = state.intake.az_deg, (config.azimuth.min_deg, config.azimuth.max_deg)
     if abs(ends_deg[1] - ends_deg[0] - 360.0) < LSB_DEG:
         az_deg = next((end for end in ends_deg if abs(az_deg - end) <= 1.01 * LSB_DEG), az_deg)
     return (
@@ -89,77 +115,77 @@ def after_reply(
     state: ControlState, extra: Exchange, now_tai_s: float, config: ControlConfig, events: list[Event]
 ) -> ControlState:
     """Advance by the reply of an extra exchange; a missing or unexpected reply leaves the stage as it is."""
-    command, reply = extra.command, extra.reply
-    is_refused = isinstance(reply, Nak) and state.status is not None and state.status.is_remote_enabled
-    match (state.stage, command, reply):
+    startup, command, reply = state.startup, extra.command, extra.reply
+    is_refused = isinstance(reply, Nak) and state.intake.status is not None and state.intake.status.is_remote_enabled
+    match (startup.stage, command, reply):
         case (_, Stop(), Ack()):
-            return changed(state, is_stop_due=False, watchdog=_perhaps_set(state, config))
+            startup = changed(startup, watchdog=_perhaps_set(startup, config))
         case (_, ReadParameter("W") | WriteParameter("W"), _):
-            return _after_watchdog(state, extra, now_tai_s, config, events, is_refused=is_refused)
-        case (Stage.READY, SelectBackup(), Ack()) if state.watchdog is Watchdog.SET:
-            return changed(state, watchdog=Watchdog.UNKNOWN)  # a backup to select may come from a power cycle
+            startup = _after_watchdog(startup, extra, now_tai_s, config, events, is_refused=is_refused)
+        case (Stage.READY, SelectBackup(), Ack()) if startup.watchdog is Watchdog.SET:
+            startup = changed(startup, watchdog=Watchdog.UNKNOWN)  # a backup to select may come from a power cycle
         case (Stage.NEW, Identify(), Identity() as identity):
-            return _identified(state, identity, config, events)
+            startup = _identified(startup, identity, config, events)
         case (Stage.IDENTIFIED, ReadRegisters(), Registers(tilt_code=tilt_code)):
-            return changed(state, stage=Stage.REGISTERS_KNOWN, tilt_code=tilt_code)
+            startup = changed(startup, stage=Stage.REGISTERS_KNOWN, tilt_code=tilt_code)
         case (Stage.REGISTERS_KNOWN, ReadParameter("S"), Parameter(code=0)) | (
             Stage.REGISTERS_KNOWN,
             WriteParameter("S"),
             Ack(),
         ):
-            return changed(state, stage=Stage.SECTOR_FREE)
+            startup = changed(startup, stage=Stage.SECTOR_FREE)
         case (Stage.REGISTERS_KNOWN, WriteParameter("S"), Nak()) if is_refused:
             advice = "the antenna may turn the long way round: set the ACU's parameter S to 0 by hand"
             events.append(Event("acu.sector_refused", {"advice": advice}, is_warning=True))
-            return changed(state, stage=Stage.SECTOR_FREE)
+            startup = changed(startup, stage=Stage.SECTOR_FREE)
         case (Stage.SECTOR_FREE, WriteRegisters() as written, Ack()):
-            return changed(state, stage=Stage.PRESENT_WRITTEN, present_deg=(written.az_deg, written.el_deg))
+            startup = changed(startup, stage=Stage.PRESENT_WRITTEN, present_deg=(written.az_deg, written.el_deg))
         case (Stage.PRESENT_WRITTEN, ReadRegisters(), Registers() as read):
-            return changed(state, stage=Stage.READY if _matches(state, read) else Stage.SECTOR_FREE)
-    return state
+            startup = changed(startup, stage=Stage.READY if _matches(startup, read) else Stage.SECTOR_FREE)
+    return state if startup is state.startup else changed(state, startup=startup)
 
 
-def _identified(state: ControlState, identity: Identity, config: ControlConfig, events: list[Event]) -> ControlState:
+def _identified(startup: Startup, identity: Identity, config: ControlConfig, events: list[Event]) -> Startup:
     """One that nobody knows may be a garbled one: it is asked again.  A rehearsal on a real ACU gets no further."""
-    is_sure = identity.is_known or identity == state.identity
+    is_sure = identity.is_known or identity == startup.identity
     if not is_sure:
         events.append(Event("acu.identity_doubted", {"identity": str(identity)}, is_warning=True))
     may_go_on = is_sure and (identity.is_simulated or not config.is_rehearsal)
     stage = Stage.IDENTIFIED if may_go_on else Stage.NEW
-    return changed(state, stage=stage, identity=identity, is_identity_sure=is_sure)
+    return changed(startup, stage=stage, identity=identity, is_identity_sure=is_sure)
 
 
-def _perhaps_set(state: ControlState, config: ControlConfig) -> Watchdog:
+def _perhaps_set(startup: Startup, config: ControlConfig) -> Watchdog:
     """After a STOP the watchdog is cleared also where the link, or a start, was cut off before it was read back."""
-    is_ours = config.register_watchdog_s > 0.0 and state.watchdog is Watchdog.UNKNOWN
-    return Watchdog.SET if is_ours else state.watchdog
+    is_ours = config.register_watchdog_s > 0.0 and startup.watchdog is Watchdog.UNKNOWN
+    return Watchdog.SET if is_ours else startup.watchdog
 
 
 def _after_watchdog(
-    state: ControlState,
+    startup: Startup,
     extra: Exchange,
     now_tai_s: float,
     config: ControlConfig,
     events: list[Event],
     *,
     is_refused: bool,
-) -> ControlState:
+) -> Startup:
     """The watchdog counts as set when it was read back; a clean stop has written 0."""
     if extra.command == WriteParameter(WATCHDOG, 0):
         is_done = is_refused or isinstance(extra.reply, Ack)
-        return changed(state, watchdog=Watchdog.UNKNOWN) if is_done else state
+        return changed(startup, watchdog=Watchdog.UNKNOWN) if is_done else startup
     if extra.reply == Parameter(WATCHDOG, watchdog_code(config)):
-        return changed(state, watchdog=Watchdog.SET, watchdog_from_tai_s=None)
-    from_tai_s = now_tai_s if state.watchdog_from_tai_s is None else state.watchdog_from_tai_s
+        return changed(startup, watchdog=Watchdog.SET, watchdog_from_tai_s=None)
+    from_tai_s = now_tai_s if startup.watchdog_from_tai_s is None else startup.watchdog_from_tai_s
     if is_refused or now_tai_s - from_tai_s >= WATCHDOG_TRY_S:
         advice = "if this host dies in a loss of signal, the antenna drives to its last command and stays there"
         events.append(Event("acu.watchdog_refused", {"advice": advice}, is_warning=True))
-        return changed(state, watchdog=Watchdog.REFUSED, watchdog_from_tai_s=None)
-    return changed(state, watchdog_from_tai_s=from_tai_s)
+        return changed(startup, watchdog=Watchdog.REFUSED, watchdog_from_tai_s=None)
+    return changed(startup, watchdog_from_tai_s=from_tai_s)
 
 
-def _matches(state: ControlState, read: Registers) -> bool:
-    if state.present_deg is None:
+def _matches(startup: Startup, read: Registers) -> bool:
+    if startup.present_deg is None:
         return False
-    az_deg, el_deg = state.present_deg
+    az_deg, el_deg = startup.present_deg
     return abs(wrap_180(read.az_deg - az_deg)) < LSB_DEG and abs(read.el_deg - el_deg) < LSB_DEG

@@ -1,54 +1,23 @@
-"""What the 10 Hz decision remembers from tick to tick, what it is given, and what it orders.  All frozen."""
+"""What the 10 Hz decision remembers from tick to tick, in parts.  All frozen.
 
-from dataclasses import dataclass, field
-from enum import IntEnum, StrEnum
+Each part has one owner: the module that its docstring names, and no other, makes a new one of it.  Whoever else wants
+it changed calls a function of the owner; to read, everybody may.  The classes stand together here, and not with their
+owners, because each owner reads the parts of the others (tests/test_one_owner.py holds all to it).
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
 from math import inf
-from typing import Any
 
-from acu_daemon.control.axis_watch import AxesWatch, Bounds
+from acu_daemon.control.axis_watch import AxesWatch
+from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.encoder_watch import EncoderWatch
 from acu_daemon.control.lag import LagEstimate
 from acu_daemon.control.states import TrackState
 from acu_daemon.control.turn import TurnWatch
-from acu_daemon.model import AxisLimits, FitResult, Model, Prediction, Reading
+from acu_daemon.model import Model, Reading
 from acu_daemon.pointing.axis import AxisState
-from acu_daemon.pointing.reach import OutOfReach
-from acu_daemon.protocol.messages import Command, Identity, Nak, Reply, Status
-
-
-@dataclass(frozen=True, slots=True)
-class ControlConfig:
-    """Everything of the TOML files that the decision of a tick depends on."""
-
-    azimuth: AxisLimits
-    elevation: AxisLimits
-    period_s: float = 0.1
-    sample_delay_s: float = 0.010  # start of WRITE AND STATUS to the sample of the angles, ICD section 6
-    poll_sample_delay_s: float = 0.010  # the same for STATUS POLL
-    effect_delay_s: float = 0.020  # start of a write to the moment the command takes effect, ICD section 6
-    beamwidth_deg: float = 1.0
-    lock_dwell_s: float = 1.0
-    min_elevation_deg: float = 5.0
-    preposition_s: float = 120.0
-    acquire_s: float = 60.0
-    hold_s: float = 1200.0
-    search_s: float = 120.0
-    search_along_s: float = 10.0
-    search_across_deg: float = 2.0
-    is_armed: bool = True  # at the start; later as people arm and disarm
-    is_shadow: bool = False  # commands nothing, whatever happens
-    is_rehearsal: bool = False  # commands nothing but an ACU that says it is simulated
-    register_watchdog_s: float = 0.0  # the ACU's parameter W; 0: it is not touched
-    following: Bounds = Bounds()
-    clock_alarm_deg: float = 0.1  # an error of UTC counts from here on, at the sky's present rate
-
-
-class Request(StrEnum):
-    """What a person asks of a running daemon."""
-
-    ARM = "arm"
-    DISARM = "disarm"
-    CLEAR = "clear"
+from acu_daemon.protocol.messages import Command, Identity, Status
 
 
 class Watchdog(IntEnum):
@@ -70,13 +39,38 @@ class Stage(IntEnum):
     READY = 5
 
 
-@dataclass(frozen=True, slots=True)
-class Sent:
-    """A register write: the angles sent (continuous azimuth), and whether the lag may be learned from it."""
+@dataclass(frozen=True)
+class Intake:
+    """The newest status and where it shows the antenna.  Owner: control.intake."""
 
-    az_deg: float
-    el_deg: float
-    is_free: bool  # followed, well within what the drive can do, and not held back by the gate
+    status: Status | None = None
+    reading: Reading | None = None
+    is_place_sure: bool = False  # the newest statuses agree where the antenna is
+    az_deg: float = 0.0  # encoder azimuth of the newest status, in the frame of the wrap (continuous)
+    track_of_readings: tuple[tuple[float, float, float], ...] = ()  # the newest: time, continuous azimuth, elevation
+    is_stow_kept: bool = False  # somebody stowed the antenna while we looked on: it stays, also after a lost link
+
+
+@dataclass(frozen=True)
+class Startup:
+    """How far the start has come, and what it learned of the ACU.  Owner: control.start."""
+
+    stage: Stage = Stage.NEW
+    identity: Identity | None = None  # as the ACU said it last
+    is_identity_sure: bool = False  # a known one, or said twice
+    tilt_code: int = 0
+    present_deg: tuple[float, float] | None = None  # the first register write of this start, to be read back
+    watchdog: Watchdog = Watchdog.UNKNOWN
+    watchdog_from_tai_s: float | None = None  # since when it is tried to set it
+
+
+@dataclass(frozen=True)
+class Arming:
+    """Whether anything may be commanded, and the STOP that is owed.  Owner: control.arming."""
+
+    by_people: bool | None = None  # as people or another hand at the ACU left it; None: as configured
+    disarmed_by: str = ""
+    is_stop_due: bool = False  # STOP is sent until it is acknowledged
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +80,83 @@ class Held:
     has_interlock_fault: bool = False  # n5.b3: the bit with which the ACU's register watchdog shows
 
 
+@dataclass(frozen=True)
+class ForeignStop:
+    """The antenna that the daemon holds, which only another hand's STOP takes from it.  Owner: control.foreign_stop."""
+
+    held: Held | None = None  # None: it does not hold the antenna; kept through lost links and restarts
+    is_doubted: bool = False  # found in STANDBY, by a hand or by the register watchdog: FAULT DETAIL tells
+
+
+@dataclass(frozen=True)
+class Interlock:
+    """What FAULT DETAIL was asked for.  Owner: control.interlock."""
+
+    faults_read: tuple[bool, ...] | None = None  # the fault bits of the status whose detail was read, while in FAULT
+
+
+@dataclass(frozen=True)
+class Latch:
+    """How the axes obey, and what latched them.  Owner: control.axis_latch."""
+
+    problem: str = ""  # what an axis did wrong; nothing moves until a person clears it
+    axes: AxesWatch = AxesWatch()
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """A register write: the angles sent (continuous azimuth), and whether the lag may be learned from it."""
+
+    az_deg: float
+    el_deg: float
+    is_free: bool  # followed, well within what the drive can do, and not held back by the limiter
+
+
+@dataclass(frozen=True)
+class Registers:
+    """What was sent to the registers, and what they hold.  Owner: control.registers."""
+
+    axis_az: AxisState | None = None  # the last command as position and rate, continuous azimuth
+    axis_el: AxisState | None = None
+    was_followed: bool = False
+    last_write_tai_s: float | None = None
+    commands: tuple[Sent | None, ...] = ()  # the newest three, oldest first; None: a tick without a write
+    in_force: tuple[float, float, float] | None = None  # the last accepted write: time, continuous azimuth, elevation
+    goal_az_deg: float | None = None  # where the registers that are followed lead the azimuth, continuous
+    refused_tai_s: float = -inf  # the newest refusal of a register write
+    refused_until_tai_s: float = -inf
+
+
+@dataclass(frozen=True)
+class Refusals:
+    """What the daemon itself kept back, counted and told once.  Owner: control.registers."""
+
+    refusal: str = ""  # of the limiter, so that only its change is logged
+    refused_input: str = ""  # what the tick was given and is not finite, so that only its change is logged
+    limited: str = ""  # which axis is held at its limit; for some seconds after it is not, so that noise tells nothing
+    limited_tai_s: float = -inf
+    refusal_count: int = 0
+    clamped_count: int = 0  # followed writes that the limiter held back to what the axes can do
+    limited_count: int = 0  # writes that the limiter held at a limit of an axis
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The exchange beside the writes that was ordered last.  Owner: control.extra_exchange."""
+
+    command: Command | None = None
+    again_tai_s: float = -inf  # until then it is not sent again
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """The state of the table.  Owner: control.walk."""
+
+    track: TrackState = TrackState.LINK_LOST
+    entered_tai_s: float = -inf
+    hold_from_tai_s: float = -inf
+
+
 @dataclass(frozen=True, slots=True)
 class PathOffset:
     """The satellite beside the prediction from a model, smoothed: seconds late, degrees right (control.track_frame)."""
@@ -93,6 +164,18 @@ class PathOffset:
     along_s: float
     across_deg: float
     model: Model
+
+
+@dataclass(frozen=True)
+class Signal:
+    """What autotrack has shown of this pass's satellite.  Owner: control.path_offset."""
+
+    pass_rise_tai_s: float | None = None  # of the pass for which the rest is known
+    acquired_since_tai_s: float | None = None
+    has_acquired: bool = False
+    has_locked: bool = False  # acquired for the dwell time, once at least
+    offset: PathOffset | None = None  # carries the path before the first fit
+    is_offset_refused: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,134 +198,65 @@ class Scan:
 
 
 @dataclass(frozen=True)
-class ControlState:
-    """The memory of the 10 Hz decision.  Without slots, which `changed` (control.changed) cannot copy at once."""
+class Search:
+    """The search in progress, or the last one.  Owner: control.searching."""
 
-    track: TrackState = TrackState.LINK_LOST
-    entered_tai_s: float = -inf
-    stage: Stage = Stage.NEW
-    identity: Identity | None = None  # as the ACU said it last
-    is_identity_sure: bool = False  # a known one, or said twice
-    tilt_code: int = 0
-    present_deg: tuple[float, float] | None = None  # the first register write of this start, to be read back
-    status: Status | None = None
-    reading: Reading | None = None
-    is_place_sure: bool = False  # the newest statuses agree where the antenna is
-    az_deg: float = 0.0  # encoder azimuth of the newest status, in the frame of the wrap (continuous)
-    track_of_readings: tuple[tuple[float, float, float], ...] = ()  # the newest: time, continuous azimuth, elevation
-    acquired_since_tai_s: float | None = None
-    has_locked: bool = False  # acquired for the dwell time, once at least
-    has_acquired: bool = False
-    is_stow_kept: bool = False  # somebody stowed the antenna while we looked on: it stays, also after a lost link
-    hold_from_tai_s: float = -inf
-    offset: PathOffset | None = None  # carries the path before the first fit
-    is_offset_refused: bool = False
     scan: Scan = Scan()
     scanned_tai_s: float = -inf  # the newest reading that the scan has taken
-    pass_rise_tai_s: float | None = None  # of the pass for which it, and that a signal was acquired, is known
-    axis_az: AxisState | None = None  # the last command as position and rate, continuous azimuth
-    axis_el: AxisState | None = None
-    was_followed: bool = False
-    last_write_tai_s: float | None = None
-    commands: tuple[Sent | None, ...] = ()  # the newest three, oldest first; None: a tick without a write
-    lag_az: LagEstimate = LagEstimate()
-    lag_el: LagEstimate = LagEstimate()
-    last_extra: Command | None = None
-    extra_after_tai_s: float = -inf
-    refused_tai_s: float = -inf  # the newest refusal of a register write
-    refused_until_tai_s: float = -inf
-    gate_refusal_count: int = 0
-    gate_clamped_count: int = 0  # followed writes that the gate held back to what the axes can do
-    refusal: str = ""  # of the gate, so that only its change is logged
-    refused_input: str = ""  # what the tick was given and is not finite, so that only its change is logged
-    limited: str = ""  # which axis is held at its limit; for some seconds after it is not, so that noise tells nothing
-    limited_tai_s: float = -inf
-    gate_limited_count: int = 0  # writes that the gate held at a limit of an axis
-    arming: bool | None = None  # as people or another hand at the ACU left it; None: as configured
-    disarmed_by: str = ""
-    latch: str = ""  # what an axis did wrong; nothing moves until a person clears it
-    faults_read: tuple[bool, ...] | None = None  # the fault bits of the status whose detail was read, while in FAULT
-    is_stop_due: bool = False  # STOP is sent until it is acknowledged
-    in_force: tuple[float, float, float] | None = None  # the last accepted write: time, continuous azimuth, elevation
-    held: Held | None = None  # None: it does not hold the antenna; kept through lost links and restarts
-    is_stop_doubted: bool = False  # found in STANDBY, by a hand or by the register watchdog: FAULT DETAIL tells
-    watchdog: Watchdog = Watchdog.UNKNOWN
-    watchdog_from_tai_s: float | None = None  # since when it is tried to set it
-    axes: AxesWatch = AxesWatch()
-    encoders: EncoderWatch = EncoderWatch()
-    turn: TurnWatch = TurnWatch()
-    goal_az_deg: float | None = None  # where the registers that are followed lead the azimuth, continuous
+
+
+@dataclass(frozen=True)
+class Lag:
+    """The lag from command to encoder, learned per axis.  Owner: control.learned_lag."""
+
+    az: LagEstimate = LagEstimate()
+    el: LagEstimate = LagEstimate()
+
+
+@dataclass(frozen=True)
+class ControlState:
+    """The memory of the 10 Hz decision.  Without slots, as its parts, for `changed` (control.changed)."""
+
+    intake: Intake = Intake()
+    startup: Startup = Startup()
+    arming: Arming = Arming()
+    foreign_stop: ForeignStop = ForeignStop()
+    interlock: Interlock = Interlock()
+    latch: Latch = Latch()
+    turn: TurnWatch = TurnWatch()  # owner: control.relearn
+    encoders: EncoderWatch = EncoderWatch()  # owner: control.intake
+    registers: Registers = Registers()
+    refusals: Refusals = Refusals()
+    asked: Asked = Asked()
+    tracking: Tracking = Tracking()
+    signal: Signal = Signal()
+    search: Search = Search()
+    lag: Lag = Lag()
 
     def is_armed(self, config: ControlConfig) -> bool:
         """Whether anything may be written to the ACU."""
-        armed = config.is_armed if self.arming is None else self.arming
+        armed = config.is_armed if self.arming.by_people is None else self.arming.by_people
         return armed and not config.is_shadow
 
     def lag_s(self, config: ControlConfig) -> tuple[float, float]:
         """Learned lag of azimuth and elevation, seconds."""
         phase_s = config.period_s - config.effect_delay_s + config.sample_delay_s
-        return self.lag_az.lag_s(phase_s, config.period_s), self.lag_el.lag_s(phase_s, config.period_s)
+        return self.lag.az.lag_s(phase_s, config.period_s), self.lag.el.lag_s(phase_s, config.period_s)
 
 
-@dataclass(frozen=True, slots=True)
-class Exchange:
-    """An extra exchange that was tried, and its reply; None when none came in time."""
-
-    command: Command
-    reply: Reply | None
-
-
-@dataclass(frozen=True)
-class Observation:
-    """What the last tick brought.  Copied by `changed`."""
-
-    reading: Reading | None = None  # with the status it came from; None: no good reply to the last write or poll
-    status: Status | None = None
-    is_confirmed: bool = True  # the place in the status, by those before it
-    is_in_step: bool = True  # the reply is sure to be to this exchange: the reading's time is right
-    extra: Exchange | None = None
-    refused: Nak | None = None  # the ACU refused the register write
-    silence_s: float = 0.0
-    must_poll: bool = False  # the last exchange failed: the next command is a poll (ICD section 1)
-    requests: tuple[Request, ...] = ()
-    has_room: bool = True  # the computed cycle leaves room for a second exchange beside the write (ICD section 6)
-
-
-@dataclass(frozen=True, slots=True)
-class PassPlan:
-    """The pass ahead, with the turn of the cable wrap chosen for the whole of it."""
-
-    rise_tai_s: float
-    set_tai_s: float
-    start_tai_s: float
-    start_az_deg: float  # continuous, encoder frame: where PREPOSITION goes
-    start_el_deg: float
-    note: str = ""  # why the turn is not a good one, when no turn holds the whole pass
-    beyond: tuple[OutOfReach, ...] = ()  # when which axis cannot follow
-
-
-@dataclass(frozen=True, slots=True)
-class Sky:
-    """What the background knows: the buffer, the last fit, the plan."""
-
-    prediction: Prediction | None = None
-    fit: FitResult | None = None
-    plan: PassPlan | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Event:
-    """A fact for the log."""
-
-    name: str
-    fields: dict[str, Any] = field(default_factory=dict)
-    is_warning: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Orders:
-    """What this tick sends: an exchange that brings a status, and at most one beside it; or that one in its place."""
-
-    first: Command
-    extra: Command | None = None
-    events: tuple[Event, ...] = ()
+def remembered(
+    *,
+    by_people: bool | None,
+    disarmed_by: str,
+    is_stop_due: bool,
+    latch: str,
+    held: Held | None,
+    is_stow_kept: bool,
+) -> ControlState:
+    """The memory that a run begins with: what people and the antenna have told the one before it."""
+    return ControlState(
+        intake=Intake(is_stow_kept=is_stow_kept),
+        arming=Arming(by_people, disarmed_by, is_stop_due),
+        foreign_stop=ForeignStop(held),
+        latch=Latch(latch),
+    )

@@ -7,7 +7,7 @@ orbit at every instant, one in this frame stays the same through the pass.
 
 from math import asin, atan2, cos, degrees, hypot, isfinite, radians, sin
 
-from acu_daemon.control.state import ControlConfig
+from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.model import Pointing, Prediction
 from acu_daemon.units import wrap_180
 

@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 
 from acu_daemon.assist.gate import DWELL, OUT_OF_STEP
 from acu_daemon.control.refit import GateVerdict
-from acu_daemon.control.state import ControlState, Sky
+from acu_daemon.control.state import ControlState
+from acu_daemon.control.tick_input import Sky
 from acu_daemon.model import Model, Reading, Readings
 
 

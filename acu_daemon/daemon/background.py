@@ -10,10 +10,12 @@ import structlog
 
 from acu_daemon.assist.gate import ABOVE_MAX_ELEVATION
 from acu_daemon.control.approach import lead_s
+from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.finite import is_fit
+from acu_daemon.control.path_offset import resume_pass
 from acu_daemon.control.refit import GateVerdict, RefitReply, RefitRequest, RefitSetup, before_fit, predict_from
-from acu_daemon.control.state import ControlConfig, PassPlan
 from acu_daemon.control.states import ACTIVE, AUTOTRACKING, HOLDING, TrackState
+from acu_daemon.control.tick_input import PassPlan
 from acu_daemon.control.track_frame import extents
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.edge.clock import Clock
@@ -79,7 +81,7 @@ class Background:
         self._log: Any = structlog.get_logger("fit")
         if setup.is_resumed:
             area.sky = replace(area.sky, fit=before_fit(setup, clock.tai_s()))
-            area.state = replace(area.state, has_acquired=True)
+            area.state = resume_pass(area.state)
 
     def wake(self) -> None:
         """Look whether a refit is due.  Called by the foreground after every tick; never blocks.
@@ -102,12 +104,12 @@ class Background:
     def _is_due(self) -> bool:
         """At once when the pass is near and on a loss; each second while locked; at low water."""
         area, now_tai_s = self._area, self._clock.tai_s()
-        before, self._seen = self._seen, area.state.track
-        if area.state.status is None or not self._is_near(now_tai_s):
+        before, self._seen = self._seen, area.state.tracking.track
+        if area.state.intake.status is None or not self._is_near(now_tai_s):
             return False
         if not self._has_asked:
             return True
-        is_loss = before in AUTOTRACKING and area.state.track in HOLDING
+        is_loss = before in AUTOTRACKING and area.state.tracking.track in HOLDING
         if is_loss:
             return True
         since_last_s = now_tai_s - self._last_tai_s
@@ -118,7 +120,7 @@ class Background:
 
     def _is_near(self, now_tai_s: float) -> bool:
         plan = self._area.sky.plan
-        if plan is None or self._area.state.track in ACTIVE:
+        if plan is None or self._area.state.tracking.track in ACTIVE:
             return plan is not None
         return now_tai_s >= plan.rise_tai_s - lead_s(plan, self._area.state, self._control) - REFIT_PERIOD_S
 
@@ -202,7 +204,7 @@ class Background:
 
         Less where an ephemeris has not so much.
         """
-        if self._area.state.track not in BESIDE:
+        if self._area.state.tracking.track not in BESIDE:
             return 0.0, 0.0
         reach_s = math.ceil(extents(self._area.sky.prediction, self._control)[0])
         lead_in_s = PAST_S + longest_window_s(self._setup.azimuth)
@@ -217,13 +219,13 @@ class Background:
         if sky.plan is not None and (sky.prediction is None or tai_s < sky.plan.start_tai_s):
             return sky.plan.start_az_deg
         point = sky.prediction.at(tai_s, follow=False) if sky.prediction else None
-        if point is not None and abs(point.az_deg - state.az_deg) < 180.0:
+        if point is not None and abs(point.az_deg - state.intake.az_deg) < 180.0:
             return point.az_deg
-        if state.track in AUTOTRACKING:
-            return state.az_deg
+        if state.tracking.track in AUTOTRACKING:
+            return state.intake.az_deg
         if point is not None:
             return point.az_deg
-        return state.az_deg
+        return state.intake.az_deg
 
     def _report(self, reply: RefitReply) -> None:
         """Log what the gate and the choice of the model have changed."""

@@ -7,12 +7,16 @@ from typing import Any
 import structlog
 
 from acu_daemon.assist.gate import Dwell
+from acu_daemon.control.arming import owes_stop
 from acu_daemon.control.causes import LINK_SILENCE_S, is_acquired
 from acu_daemon.control.changed import changed
+from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.doubt import Doubt
-from acu_daemon.control.state import ControlConfig, Event, Exchange, Observation, Request, Stage, Watchdog
+from acu_daemon.control.orders import Event
+from acu_daemon.control.state import Stage, Watchdog
 from acu_daemon.control.states import AUTOTRACKING
 from acu_daemon.control.tick import tick
+from acu_daemon.control.tick_input import Exchange, Observation, Request
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.clock_watch import ClockWatch
 from acu_daemon.daemon.lateness import Lateness
@@ -103,13 +107,13 @@ class Foreground:
                 missed += 1  # two writes that near to each other would be a burst
             self.skipped_tick_count += missed
             due_tai_s = round(due_tai_s / period_s + 1 + missed) * period_s
-            log.debug("tick", late_ms=1e3 * late_s, skipped=missed, status=self._area.state.status)
+            log.debug("tick", late_ms=1e3 * late_s, skipped=missed, status=self._area.state.intake.status)
 
     async def _hurry(self, due_tai_s: float) -> None:
         """While the start's exchanges are answered, the next one follows in the same tick if it fits."""
         end_tai_s, begun_tai_s = due_tai_s + HURRY_SHARE * self._config.period_s, due_tai_s
         while (
-            self._area.state.stage is not Stage.READY
+            self._area.state.startup.stage is not Stage.READY
             and self._has_news()
             and self._port.is_up
             and not self._port.must_poll
@@ -123,13 +127,13 @@ class Foreground:
     def _has_news(self) -> bool:
         """Whether the start can go on: its last question is answered, or the first status of all has come."""
         if self._seen.extra is None:
-            return self._seen.status is not None and self._area.state.status is None
+            return self._seen.status is not None and self._area.state.intake.status is None
         return not isinstance(self._seen.extra.reply, Nak | None)
 
     def _next_s(self, begun_tai_s: float) -> float:
         """How long the next decision's exchanges take: one of the start's alone as long as the last, else the most."""
         state = self._area.state
-        is_alone = state.is_place_sure and Stage.NEW < state.stage < Stage.PRESENT_WRITTEN
+        is_alone = state.intake.is_place_sure and Stage.NEW < state.startup.stage < Stage.PRESENT_WRITTEN
         return self._clock.tai_s() - begun_tai_s if is_alone else self._port.both_s
 
     async def _tick(self) -> None:
@@ -154,7 +158,9 @@ class Foreground:
         if not port.is_up:
             return
         is_answered = await (self._question() if seen.must_poll else self._do(orders.first))
-        is_progress = not seen.must_poll or area.state.stage is not Stage.READY  # no poll in the place of a write
+        is_progress = (
+            not seen.must_poll or area.state.startup.stage is not Stage.READY
+        )  # no poll in the place of a write
         self.answered_count += is_answered and is_progress
         if orders.extra is not None and port.is_up and not port.must_poll:
             await port.idle_gap()
@@ -167,7 +173,7 @@ class Foreground:
     def _silence_s(self) -> float:
         """On another connection, however soon it came, everything is read again before it is commanded."""
         before, self._connect_count = self._connect_count, self._port.connect_count
-        is_another = before != self._connect_count and self._area.state.stage is not Stage.NEW
+        is_another = before != self._connect_count and self._area.state.startup.stage is not Stage.NEW
         is_blind = self._clock.monotonic_s() - self._status_s > BLIND_S
         return self._port.silence_s if self._port.is_up and not is_another and not is_blind else math.inf
 
@@ -235,7 +241,7 @@ class Foreground:
         if not answer.is_sure:
             self._area.out_of_step_count += is_locked
             return
-        if is_locked and self._area.state.track in AUTOTRACKING and not self._area.state.encoders.problem:
+        if is_locked and self._area.state.tracking.track in AUTOTRACKING and not self._area.state.encoders.problem:
             self._area.to_fit.append(reading)
         if self._on_reading is not None:
             self._on_reading(reading)
@@ -267,11 +273,11 @@ class Foreground:
     @property
     def owes_stop(self) -> bool:
         """Whether the antenna obeys us, or who was killed before us, or a STOP for it was not acknowledged yet."""
-        state = self._area.state
-        is_held = self.write_count > 0 or state.held is not None
-        return state.is_stop_due or (is_held and state.is_armed(self._config))
+        return owes_stop(self._area.state, self._config, has_written=self.write_count > 0)
 
     async def safe_stop(self) -> bool:
         """Stop the antenna.  True: stopped, or left to somebody else; False: not acknowledged."""
-        clears_watchdog = self._config.register_watchdog_s > 0.0 and self._area.state.watchdog is not Watchdog.REFUSED
+        clears_watchdog = (
+            self._config.register_watchdog_s > 0.0 and self._area.state.startup.watchdog is not Watchdog.REFUSED
+        )
         return await stop_antenna(self._port, DEADLINE_S, clears_watchdog=clears_watchdog)

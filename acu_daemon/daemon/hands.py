@@ -4,8 +4,9 @@ import json
 from collections.abc import Callable
 from dataclasses import asdict
 
-from acu_daemon.control.state import ControlConfig, Request
+from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.states import TrackState
+from acu_daemon.control.tick_input import Request
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.snapshot import Snapshot
 
@@ -37,15 +38,15 @@ class Hands:
         state = self._area.state
         if self._control.is_shadow:
             return f"error this daemon runs with --shadow: it commands nothing, so there is nothing to {request}"
-        if request is Request.CLEAR and not state.latch:
+        if request is Request.CLEAR and not state.latch.problem:
             return "ok nothing is latched"
         self._ask(request)
-        if request is Request.ARM and state.latch:
-            return f"ok armed, but latched: {state.latch}; look at the antenna, then `acu-daemon clear`"
-        if request is Request.ARM and state.track is TrackState.FAULT:
+        if request is Request.ARM and state.latch.problem:
+            return f"ok armed, but latched: {state.latch.problem}; look at the antenna, then `acu-daemon clear`"
+        if request is Request.ARM and state.tracking.track is TrackState.FAULT:
             return "ok armed, but the ACU reports a fault: an emergency stop or an open door disarms again"
         return {
             Request.ARM: "ok armed",
             Request.DISARM: "ok disarmed: STOP is sent if the daemon moves the antenna, then nothing",
-            Request.CLEAR: f"ok cleared: {state.latch}",
+            Request.CLEAR: f"ok cleared: {state.latch.problem}",
         }[request]

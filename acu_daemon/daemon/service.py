@@ -3,16 +3,19 @@
 import asyncio
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import structlog
 
 from acu_daemon.control.approach import lead_s
+from acu_daemon.control.arming import begin_run
 from acu_daemon.control.causes import is_tracked, pass_end_tai_s
+from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.foreign_stop import release
 from acu_daemon.control.plan import plan_pass
 from acu_daemon.control.refit import RefitSetup
-from acu_daemon.control.state import ControlConfig, ControlState
+from acu_daemon.control.state import ControlState, remembered
 from acu_daemon.control.states import ACTIVE
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.background import Background
@@ -114,9 +117,7 @@ class Service:
         self._started_tai_s = math.inf
         self._planned_turns = 0  # the turns that were learned anew before the plan was made
         self._log: Any = structlog.get_logger("pass")
-        is_ours = job.state.is_armed(job.control) or job.state.held is not None
-        is_stop_due = job.state.is_stop_due and is_ours and not job.control.is_shadow
-        self._area = CommonArea(state=replace(job.state, is_stop_due=is_stop_due))
+        self._area = CommonArea(state=begin_run(job.state, job.control))
         self._port = AcuPort(link, clock, job.address, job.control.period_s, job.device_delay_s)
         self._background = Background(
             self._area,
@@ -205,7 +206,7 @@ class Service:
     def _look_anew(self, why_anew: Callable[[bool, float], str], now_tai_s: float) -> None:
         state, sky = self._area.state, self._area.sky
         if not is_tracked(state, sky, now_tai_s):
-            self.anew_reason = why_anew(state.track not in ACTIVE, self._foreground.clock_watch.step_s)
+            self.anew_reason = why_anew(state.tracking.track not in ACTIVE, self._foreground.clock_watch.step_s)
             if self.anew_reason:
                 self._is_over.set()
 
@@ -213,20 +214,20 @@ class Service:
     def memory(self) -> ControlState:
         """What of this run's memory another one begins with: what people and the antenna have told."""
         state = self._area.state
-        return ControlState(
-            arming=state.arming,
-            disarmed_by=state.disarmed_by,
-            latch=state.latch,
-            is_stop_due=state.is_stop_due,
-            held=state.held,
-            is_stow_kept=state.is_stow_kept,
+        return remembered(
+            by_people=state.arming.by_people,
+            disarmed_by=state.arming.disarmed_by,
+            is_stop_due=state.arming.is_stop_due,
+            latch=state.latch.problem,
+            held=state.foreign_stop.held,
+            is_stow_kept=state.intake.is_stow_kept,
         )
 
     def _check_acu(self, elapsed_s: float) -> None:
-        if self._area.state.status is None and elapsed_s > FIRST_POLL_S and not self._job.is_anew:
+        if self._area.state.intake.status is None and elapsed_s > FIRST_POLL_S and not self._job.is_anew:
             why = self._port.problem or "no answer"
             raise NoAcuError(f"no good poll within {FIRST_POLL_S:g} s: {why}")
-        identity, is_sure = self._area.state.identity, self._area.state.is_identity_sure
+        identity, is_sure = self._area.state.startup.identity, self._area.state.startup.is_identity_sure
         if self._job.is_rehearsal and identity is not None and is_sure and not identity.is_simulated:
             raise UsageError(
                 f"the ACU is a real one ({identity}): a rehearsal (--at) runs only on a simulated ACU; leave out --at"
@@ -234,7 +235,7 @@ class Service:
 
     def _plan(self, now_tai_s: float) -> None:
         job, state = self._job, self._area.state
-        if state.status is None:
+        if state.intake.status is None:
             return
         self._planned_turns = state.turn.learned_count
         axes = job.control
@@ -242,7 +243,7 @@ class Service:
             job.refit.propagator,
             job.refit.site,
             job.coming,
-            state.az_deg,
+            state.intake.az_deg,
             axes.azimuth,
             now_tai_s,
             elevation=axes.elevation,
@@ -270,7 +271,7 @@ class Service:
     def _leave(self, *, is_stopped: bool) -> None:
         """Whoever starts next must not take our stop for another hand's."""
         if is_stopped and self._on_state is not None and not self._job.control.is_shadow:
-            self._on_state(replace(self._area.state, held=None))
+            self._on_state(release(self._area.state))
 
     def _after_tick(self) -> None:
         self._supervise(self._clock.tai_s())
@@ -303,7 +304,7 @@ class Service:
         lag_az_s, lag_el_s = state.lag_s(self._job.control)
         return Outcome(
             reason=reason,
-            has_acquired=state.has_acquired,
+            has_acquired=state.signal.has_acquired,
             has_begun=self._clock.tai_s() > self._job.coming.rise_tai_s,
             is_stopped=is_stopped,
             tick_count=foreground.tick_count,
@@ -311,9 +312,9 @@ class Service:
             skipped_tick_count=foreground.skipped_tick_count,
             refit_count=self._area.refit_count,
             refit_failed_count=self._area.refit_failed_count,
-            refusal_count=state.gate_refusal_count,
-            clamped_count=state.gate_clamped_count,
-            limited_count=state.gate_limited_count,
+            refusal_count=state.refusals.refusal_count,
+            clamped_count=state.refusals.clamped_count,
+            limited_count=state.refusals.limited_count,
             connect_count=self._port.connect_count,
             lag_az_s=lag_az_s,
             lag_el_s=lag_el_s,

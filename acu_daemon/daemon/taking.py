@@ -3,9 +3,10 @@
 from dataclasses import replace
 from math import isfinite
 
+from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.off_path import off_path
 from acu_daemon.control.search import covered_text
-from acu_daemon.control.state import ControlConfig, ControlState
+from acu_daemon.control.state import ControlState
 from acu_daemon.control.states import AUTOTRACKING, TrackState
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.foreground import Foreground
@@ -39,15 +40,15 @@ def take_snapshot(
         satellite=subject.satellite,
         station=subject.station,
         acu=subject.acu,
-        state_s=now_tai_s - state.entered_tai_s if isfinite(state.entered_tai_s) else None,
+        state_s=now_tai_s - state.tracking.entered_tai_s if isfinite(state.tracking.entered_tai_s) else None,
         half_beam_deg=half_beam_deg,
         off_path_deg=off.off_deg if off else None,
         is_on_path=off.off_deg <= half_beam_deg if off else None,
         path=off.made_from if off else "",
         speed_deg_s=foreground.motion.speed_deg_s(now_tai_s),
-        acu_mode=state.status.mode.name if state.status else "",
-        acu_faults=foreground.acu_faults if state.track is TrackState.FAULT else "",
-        is_stopping=state.is_stop_due,
+        acu_mode=state.intake.status.mode.name if state.intake.status else "",
+        acu_faults=foreground.acu_faults if state.tracking.track is TrackState.FAULT else "",
+        is_stopping=state.arming.is_stop_due,
         rise_utc=utc_text(coming.rise_tai_s, 0) if coming else "",
         set_utc=utc_text(coming.set_tai_s + late_s, 0) if coming else "",
         rise_in_s=coming.rise_tai_s - now_tai_s if coming else None,
@@ -69,21 +70,21 @@ def _seen(
 ) -> Snapshot:
     """All but what the run is about and where the antenna points."""
     state, sky = area.state, area.sky
-    status, reading, prediction = state.status, state.reading, sky.prediction
+    status, reading, prediction = state.intake.status, state.intake.reading, sky.prediction
     lag_az_s, lag_el_s = state.lag_s(control)
     identity, lateness = foreground.identity, foreground.lateness.figures(LATENESS_TICKS)
     return Snapshot(
         tai_s=now_tai_s,
-        state=str(state.track),
+        state=str(state.tracking.track),
         az_deg=status.az_deg if status else None,
         el_deg=status.el_deg if status else None,
         reading_age_s=now_tai_s - reading.tai_s if reading else None,
-        command_az_deg=state.axis_az.position_deg if state.axis_az else None,
-        command_el_deg=state.axis_el.position_deg if state.axis_el else None,
+        command_az_deg=state.registers.axis_az.position_deg if state.registers.axis_az else None,
+        command_el_deg=state.registers.axis_el.position_deg if state.registers.axis_el else None,
         agc_db=status.agc_db if status else None,
-        search=covered_text(state.scan, prediction, control) if state.scan.rows else "",
-        is_acquired=state.track is not TrackState.LINK_LOST and reading is not None and reading.is_locked,
-        miss_deg=None if state.track is TrackState.LINK_LOST else _miss_deg(reading, prediction),
+        search=covered_text(state.search.scan, prediction, control) if state.search.scan.rows else "",
+        is_acquired=state.tracking.track is not TrackState.LINK_LOST and reading is not None and reading.is_locked,
+        miss_deg=None if state.tracking.track is TrackState.LINK_LOST else _miss_deg(reading, prediction),
         along_s=sky.fit.along_s if sky.fit else None,
         across_deg=sky.fit.across_deg if sky.fit else None,
         fit_age_s=now_tai_s - sky.fit.at_tai_s if sky.fit else None,
@@ -101,14 +102,14 @@ def _seen(
         write_count=foreground.write_count,
         answered_count=foreground.answered_count,
         attempt_count=port.attempt_count,
-        refusal_count=state.gate_refusal_count,
-        clamped_count=state.gate_clamped_count,
-        limit_alarm=state.limited,
-        limited_count=state.gate_limited_count,
+        refusal_count=state.refusals.refusal_count,
+        clamped_count=state.refusals.clamped_count,
+        limit_alarm=state.refusals.limited,
+        limited_count=state.refusals.limited_count,
         turn_alarm=state.turn.alarm,
         arming=_arming(state, control),
-        disarmed_by=state.disarmed_by,
-        latch=state.latch,
+        disarmed_by=state.arming.disarmed_by,
+        latch=state.latch.problem,
         clock_alarm=foreground.clock_watch.alarm,
         line_alarm=foreground.line_watch.alarm,
         files_alarm=files_alarm,
@@ -118,7 +119,7 @@ def _seen(
         is_rehearsal=is_rehearsal,
         is_simulation=identity is not None and identity.is_simulated,
         model=str(area.model or ""),
-        rejecting=area.gate.rejecting if state.track in AUTOTRACKING else "",
+        rejecting=area.gate.rejecting if state.tracking.track in AUTOTRACKING else "",
         rejected_counts=area.rejected_counts,
     )
 

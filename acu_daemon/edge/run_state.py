@@ -101,8 +101,9 @@ class RunStateKeeper:
 
     def see(self, state: ControlState) -> None:
         """Take the memory of a tick; it is written where it differs."""
-        held = None if state.held is None else state.held.has_interlock_fault
-        seen, last = (str(state.track), state.arming, held, state.is_stow_kept), self._state
+        held = None if state.foreign_stop.held is None else state.foreign_stop.held.has_interlock_fault
+        arming, is_stow_kept = state.arming.by_people, state.intake.is_stow_kept
+        seen, last = (str(state.tracking.track), arming, held, is_stow_kept), self._state
         self._tick_count += 1
         is_retried = bool(self.problem) and self._tick_count % RETRY_TICKS == 0
         if seen != (last.track, last.arming, last.held, last.is_stow_kept) or is_retried:

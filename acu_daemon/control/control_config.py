@@ -1,0 +1,33 @@
+"""Everything of the TOML files that the decision of a tick depends on."""
+
+from dataclasses import dataclass
+
+from acu_daemon.control.axis_watch import Bounds
+from acu_daemon.model import AxisLimits
+
+
+@dataclass(frozen=True, slots=True)
+class ControlConfig:
+    """Everything of the TOML files that the decision of a tick depends on."""
+
+    azimuth: AxisLimits
+    elevation: AxisLimits
+    period_s: float = 0.1
+    sample_delay_s: float = 0.010  # start of WRITE AND STATUS to the sample of the angles, ICD section 6
+    poll_sample_delay_s: float = 0.010  # the same for STATUS POLL
+    effect_delay_s: float = 0.020  # start of a write to the moment the command takes effect, ICD section 6
+    beamwidth_deg: float = 1.0
+    lock_dwell_s: float = 1.0
+    min_elevation_deg: float = 5.0
+    preposition_s: float = 120.0
+    acquire_s: float = 60.0
+    hold_s: float = 1200.0
+    search_s: float = 120.0
+    search_along_s: float = 10.0
+    search_across_deg: float = 2.0
+    is_armed: bool = True  # at the start; later as people arm and disarm
+    is_shadow: bool = False  # commands nothing, whatever happens
+    is_rehearsal: bool = False  # commands nothing but an ACU that says it is simulated
+    register_watchdog_s: float = 0.0  # the ACU's parameter W; 0: it is not touched
+    following: Bounds = Bounds()
+    clock_alarm_deg: float = 0.1  # an error of UTC counts from here on, at the sky's present rate

@@ -1,0 +1,71 @@
+"""The newest status, and where it shows the antenna.  Owner of `Intake` and of the encoders' watch.  Pure."""
+
+from dataclasses import replace
+
+from acu_daemon.control.causes import is_acquired
+from acu_daemon.control.changed import changed
+from acu_daemon.control.encoder_watch import watch_encoders
+from acu_daemon.control.orders import Event
+from acu_daemon.control.state import ControlState
+from acu_daemon.control.states import AUTOTRACKING
+from acu_daemon.control.tick_input import Sky
+from acu_daemon.model import Reading
+from acu_daemon.protocol.messages import AcuMode, Status
+
+RATE_READINGS = 6  # the rate of an axis is taken over this many readings: near the zenith one pair is all noise
+
+
+def take_status(
+    state: ControlState, status: Status, reading: Reading, az_deg: float, *, is_confirmed: bool
+) -> ControlState:
+    """Remember a status and its reading.  az_deg: where the azimuth is, continuous."""
+    before = state.intake
+    intake = replace(
+        before,
+        status=status,
+        reading=reading,
+        is_place_sure=is_confirmed,
+        az_deg=az_deg,
+        track_of_readings=(
+            *state.intake.track_of_readings[1 - RATE_READINGS :],
+            (reading.tai_s, az_deg, status.el_deg),
+        ),
+        is_stow_kept=_is_stow_kept(state, status),
+    )
+    return changed(state, intake=intake)
+
+
+def _is_stow_kept(state: ControlState, status: Status) -> bool:
+    """A stow that began after the start is somebody's wish; an antenna found stowed at the start is ours to take."""
+    before = state.intake
+    if status.mode is AcuMode.STOWED:
+        was_elsewhere = before.status is not None and before.status.mode is not AcuMode.STOWED
+        return before.is_stow_kept or was_elsewhere or state.foreign_stop.held is not None
+    return status.mode is AcuMode.STOWING
+
+
+def shift_places(state: ControlState, shift_deg: float) -> ControlState:
+    """Put the azimuth on another turn: by a multiple of 360 deg further on."""
+    intake = state.intake
+    readings = tuple((tai_s, az + shift_deg, el) for tai_s, az, el in intake.track_of_readings)
+    return changed(state, intake=changed(intake, az_deg=intake.az_deg + shift_deg, track_of_readings=readings))
+
+
+def doubt_place(state: ControlState) -> ControlState:
+    """After a lost link nobody knows where the antenna is, until some readings agree."""
+    return changed(state, intake=changed(state.intake, is_place_sure=False))
+
+
+def watch_for_frozen(
+    state: ControlState, status: Status, reading: Reading, sky: Sky, events: list[Event]
+) -> ControlState:
+    """Watch for frozen encoders while autotrack holds the satellite."""
+    is_ours = is_acquired(status) and state.tracking.track in AUTOTRACKING
+    path = sky.prediction.at(reading.tai_s) if sky.prediction and is_ours else None
+    path = path if path is not None and path.is_finite else None
+    watch = watch_encoders(state.encoders, reading.tai_s, status, path)
+    if watch.problem and not state.encoders.problem:
+        events.append(Event("encoder.frozen", {"problem": watch.problem, "action": "not fitted"}, is_warning=True))
+    elif state.encoders.problem and not watch.problem:
+        events.append(Event("encoder.moves"))
+    return changed(state, encoders=watch)

@@ -1,0 +1,35 @@
+"""What stops the daemon's own commands: people, another hand, the interlock, an axis that does not obey.  Pure."""
+
+from acu_daemon.control.arming import owe_no_stop_to_others, owe_stop
+from acu_daemon.control.axis_latch import latch, watch_antenna
+from acu_daemon.control.axis_watch import AWAY
+from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.foreign_stop import ANOTHER_HAND, take_faults, watch_for_stop
+from acu_daemon.control.fresh_start import disarm, obey
+from acu_daemon.control.interlock import watch_interlock
+from acu_daemon.control.learned_lag import forget_lag
+from acu_daemon.control.orders import Event
+from acu_daemon.control.relearn import doubt, may_be_other_turn, watch_turn
+from acu_daemon.control.state import ControlState
+from acu_daemon.control.tick_input import Observation
+
+AZIMUTH_AWAY = f"azimuth {AWAY}"
+
+
+def supervise(
+    before: ControlState, state: ControlState, seen: Observation, config: ControlConfig, events: list[Event]
+) -> ControlState:
+    """Obey people, yield to other hands, and judge what the antenna does.  before: the memory one tick ago."""
+    state = obey(state, seen.requests, config, events)
+    state, is_stopped = watch_for_stop(before, state, config)
+    state = disarm(state, ANOTHER_HAND, events) if is_stopped else state
+    state, is_stopped = take_faults(state, seen)
+    state = disarm(state, ANOTHER_HAND, events) if is_stopped else state
+    state, person = watch_interlock(state, seen, config)
+    state = disarm(state, person, events) if person else state
+    state, problem = watch_antenna(state, seen, config)
+    if problem == AZIMUTH_AWAY and may_be_other_turn(state, config):
+        state = doubt(state, config, events, problem)
+    elif problem:
+        state = forget_lag(owe_stop(latch(state, problem, events)))
+    return watch_turn(owe_no_stop_to_others(state), seen, config, events)

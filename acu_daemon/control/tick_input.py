@@ -1,0 +1,62 @@
+"""What a tick is given: what the ACU said, what people ask, what the background knows.  All frozen."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from acu_daemon.model import FitResult, Prediction, Reading
+from acu_daemon.pointing.reach import OutOfReach
+from acu_daemon.protocol.messages import Command, Nak, Reply, Status
+
+
+class Request(StrEnum):
+    """What a person asks of a running daemon."""
+
+    ARM = "arm"
+    DISARM = "disarm"
+    CLEAR = "clear"
+
+
+@dataclass(frozen=True, slots=True)
+class Exchange:
+    """An extra exchange that was tried, and its reply; None when none came in time."""
+
+    command: Command
+    reply: Reply | None
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What the last tick brought.  Copied by `changed`."""
+
+    reading: Reading | None = None  # with the status it came from; None: no good reply to the last write or poll
+    status: Status | None = None
+    is_confirmed: bool = True  # the place in the status, by those before it
+    is_in_step: bool = True  # the reply is sure to be to this exchange: the reading's time is right
+    extra: Exchange | None = None
+    refused: Nak | None = None  # the ACU refused the register write
+    silence_s: float = 0.0
+    must_poll: bool = False  # the last exchange failed: the next command is a poll (ICD section 1)
+    requests: tuple[Request, ...] = ()
+    has_room: bool = True  # the computed cycle leaves room for a second exchange beside the write (ICD section 6)
+
+
+@dataclass(frozen=True, slots=True)
+class PassPlan:
+    """The pass ahead, with the turn of the cable wrap chosen for the whole of it."""
+
+    rise_tai_s: float
+    set_tai_s: float
+    start_tai_s: float
+    start_az_deg: float  # continuous, encoder frame: where PREPOSITION goes
+    start_el_deg: float
+    note: str = ""  # why the turn is not a good one, when no turn holds the whole pass
+    beyond: tuple[OutOfReach, ...] = ()  # when which axis cannot follow
+
+
+@dataclass(frozen=True, slots=True)
+class Sky:
+    """What the background knows: the buffer, the last fit, the plan."""
+
+    prediction: Prediction | None = None
+    fit: FitResult | None = None
+    plan: PassPlan | None = None
