@@ -11,6 +11,7 @@ from acu_daemon.control.turn import (
     BIT_SCORE,
     DENIED_COUNT,
     PATIENCE_S,
+    PULL_DEG_S,
     PULL_S,
     STEP_DEG,
     SURE_COUNT,
@@ -122,12 +123,27 @@ def test_an_antenna_that_the_acu_drives_the_long_way_round_is_told_from_a_revers
     assert is_pulled_round(side * -160.0, side * -20.0, side * -50.0, WRAP)  # far on its way round
 
 
-def test_a_pull_counts_after_half_a_second_without_a_break() -> None:
-    watch, verdicts = TurnWatch(), []
-    for k in range(20):
-        watch, verdict = watch_pull(watch, TICK_S * k, is_pulled=k != 3)
+def pulled(rates_deg_s: list[float], limits: AxisLimits, is_pulled: list[bool]) -> list[bool]:
+    watch, az_deg, verdicts = TurnWatch(), 0.0, []
+    for k, rate_deg_s in enumerate(rates_deg_s):
+        az_deg += rate_deg_s * TICK_S
+        watch, verdict = watch_pull(watch, TICK_S * k, az_deg, rate_deg_s, limits, scale=1.0, is_pulled=is_pulled[k])
         verdicts.append(verdict)
+    return verdicts
+
+
+def test_a_pull_from_rest_counts_after_half_a_second_without_a_break() -> None:
+    verdicts = pulled([1.0 + k for k in range(20)], WRAP, [k != 3 for k in range(20)])
     assert verdicts.index(True) == 4 + round(PULL_S / TICK_S)
+
+
+@given(rate_deg_s=st.floats(1.0, 20.0), acceleration_deg_s2=st.floats(0.5, 10.0), share=st.floats(0.6, 1.0))
+def test_an_azimuth_that_brakes_after_its_command_has_turned_round_is_not_pulled(
+    rate_deg_s: float, acceleration_deg_s2: float, share: float
+) -> None:
+    limits = AxisLimits(-270.0, 270.0, rate_deg_s, acceleration_deg_s2)
+    rates = [-rate_deg_s + share * acceleration_deg_s2 * TICK_S * k for k in range(600)]
+    assert not any(pulled(rates, limits, [rate < -PULL_DEG_S for rate in rates]))
 
 
 def test_other_turns() -> None:
@@ -137,6 +153,56 @@ def test_other_turns() -> None:
     assert other_turn(300.0, ONE_TURN) is None
 
 
+def to_goal(
+    watch: TurnWatch,
+    k: int,
+    az_deg: float,
+    goal_deg: float,
+    limits: AxisLimits,
+    *,
+    fixed: bool = True,
+    scale: float = 1.0,
+) -> tuple[TurnWatch, bool]:
+    return watch_goal(watch, TICK_S * k, az_deg, goal_deg, limits, scale=scale, is_goal_fixed=fixed)
+
+
+@given(
+    rate_deg_s=st.floats(1.0, 20.0),
+    acceleration_deg_s2=st.floats(0.5, 10.0),
+    goal_deg_s=st.floats(-200.0, 200.0),
+    turns_after=st.integers(5, 100),
+    noise_deg=st.floats(0.0, 2.0),
+    seed=st.integers(0, 9),
+)
+def test_a_drive_that_does_its_best_is_never_doubted_however_its_goal_runs_and_turns_round(
+    rate_deg_s: float, acceleration_deg_s2: float, goal_deg_s: float, turns_after: int, noise_deg: float, seed: int
+) -> None:
+    """The drive has physics of its own: full acceleration to full rate towards the goal, whatever the goal does."""
+    limits, random = AxisLimits(-270.0, 270.0, rate_deg_s, acceleration_deg_s2), Random(seed)
+    watch, az_deg, now_deg_s, goal_deg = TurnWatch(), 0.0, 0.0, 0.0
+    most_deg_s = 0.8 * acceleration_deg_s2 * TICK_S
+    for k in range(600):
+        goal_deg += goal_deg_s * TICK_S * (1 if k < turns_after else -1)
+        gap_deg = goal_deg - az_deg
+        braking_deg_s = min(rate_deg_s, (acceleration_deg_s2 * abs(gap_deg)) ** 0.5, abs(gap_deg) / TICK_S)
+        wanted_deg_s = braking_deg_s if gap_deg > 0.0 else -braking_deg_s
+        now_deg_s += min(max(wanted_deg_s - now_deg_s, -most_deg_s), most_deg_s)
+        az_deg += now_deg_s * TICK_S
+        reading_deg = az_deg + random.gauss(0.0, noise_deg)
+        watch, is_standing = to_goal(watch, k, reading_deg, goal_deg, limits, fixed=False, scale=0.02)
+        assert not is_standing and not watch.problem
+
+
+@pytest.mark.parametrize("goal_deg_s", [0.0, 5.0, 60.0])
+def test_an_azimuth_that_stands_is_told_also_when_its_goal_moves_and_its_readings_are_noisy(goal_deg_s: float) -> None:
+    watch, random, k, is_standing = TurnWatch(), Random(1), 0, False
+    while not is_standing and k < 300:
+        reading_deg = -200.0 + random.gauss(0.0, 1.0)
+        watch, is_standing = to_goal(watch, k, reading_deg, -150.0 + goal_deg_s * TICK_S * k, WRAP, scale=0.02)
+        k += 1
+    assert TICK_S * k < 2.0 * (PATIENCE_S + drive_s(STEP_DEG, WRAP))
+
+
 @pytest.mark.parametrize("rate_deg_s", [1.5, 5.0, 20.0])
 def test_an_azimuth_that_comes_nearer_as_its_drive_can_is_let_be_and_one_that_stands_is_told_with_both_angles(
     rate_deg_s: float,
@@ -144,25 +210,25 @@ def test_an_azimuth_that_comes_nearer_as_its_drive_can_is_let_be_and_one_that_st
     drive = AxisLimits(-270.0, 270.0, rate_deg_s, rate_deg_s / 2.0)
     watch, k = TurnWatch(), 0
     while (az_deg := -200.0 + 0.9 * rate_deg_s * TICK_S * k) < 150.0:
-        watch, is_standing = watch_goal(watch, TICK_S * k, az_deg, 150.0, drive)
+        watch, is_standing = to_goal(watch, k, az_deg, 150.0, drive)
         assert not is_standing and not watch.problem
         k += 1
     watch, k = TurnWatch(), 0
     while not watch.problem:
-        watch, is_standing = watch_goal(watch, TICK_S * k, -200.0, 150.0, drive)
+        watch, is_standing = to_goal(watch, k, -200.0, 150.0, drive)
         k += 1
     assert is_standing
     assert TICK_S * k == pytest.approx(PATIENCE_S + drive_s(STEP_DEG, drive), abs=2 * TICK_S)
     assert (
         watch.problem == "azimuth late: at -200.0 deg, on the low half of the range as believed, its goal at 150.0 deg"
     )
-    assert watch_goal(watch, TICK_S * k, 149.0, 150.0, drive)[0].problem == ""
+    assert to_goal(watch, k, 149.0, 150.0, drive)[0].problem == ""
 
 
 def test_a_drive_much_slower_than_its_file_says_is_told_though_it_comes_nearer() -> None:
     watch, verdicts = TurnWatch(), []
     for k in range(600):
-        watch, is_standing = watch_goal(watch, TICK_S * k, -200.0 + 0.3 * k, 150.0, WRAP)
+        watch, is_standing = to_goal(watch, k, -200.0 + 0.3 * k, 150.0, WRAP)
         verdicts.append(is_standing)
     assert not any(verdicts)
     assert watch.problem.startswith("azimuth late")

@@ -5,6 +5,7 @@ from functools import cache
 
 import pytest
 from flights import (
+    DEMO_ANTENNA,
     DEMO_TAI_S,
     RISING_ANTENNA,
     RISING_TAI_S,
@@ -212,3 +213,15 @@ def test_p1_with_a_random_bit_where_the_turn_is_open_no_register_leaves_the_ante
         assert abs(wrap_180(az_deg - places[round(tai_s, 1)])) < 15.0
     assert not events_named(flight, "axis.latched")
     assert flight.states()[-1] == "AUTOTRACK/FITTED"
+
+
+FALSE_ALARMS = ("turn.doubted", "turn.tried", "turn.corrected", "sector.wrong", "azimuth.late", "axis.latched")
+
+
+@pytest.mark.parametrize("rate_deg_s", [4.0, 8.0])
+def test_a_path_that_runs_away_from_a_slow_azimuth_through_the_zenith_makes_no_turn_doubtful(rate_deg_s: float) -> None:
+    """The signal is lost 5 s before the zenith: the azimuth falls behind by up to 150 deg, and catches up."""
+    target = demo_target(azimuth={"max_rate_deg_s": rate_deg_s})
+    flight = flight_of(target, DEMO_TAI_S, 110.0, antenna=DEMO_ANTENNA, losses=[(56.0, 1e3)])
+    assert not [event for event in flight.events if event["event"] in FALSE_ALARMS]
+    assert worst_error_deg(flight, DEMO_TAI_S + 108.0, DEMO_TAI_S + 110.0) < 0.1

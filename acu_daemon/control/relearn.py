@@ -54,9 +54,12 @@ def may_be_other_turn(state: ControlState, config: ControlConfig) -> bool:
     """Whether an azimuth that moves away from its command does so because it stands on the other turn."""
     if not _may_doubt(state) or state.registers.in_force is None:
         return False
+    return is_pulled_round(state.intake.az_deg, _rate_deg_s(state), state.registers.in_force[1], config.azimuth)
+
+
+def _rate_deg_s(state: ControlState) -> float:
     first, last = state.intake.track_of_readings[0], state.intake.track_of_readings[-1]
-    rate_deg_s = (last[1] - first[1]) / (last[0] - first[0]) if last[0] > first[0] else 0.0
-    return is_pulled_round(state.intake.az_deg, rate_deg_s, state.registers.in_force[1], config.azimuth)
+    return (last[1] - first[1]) / (last[0] - first[0]) if last[0] > first[0] else 0.0
 
 
 def _may_doubt(state: ControlState) -> bool:
@@ -99,17 +102,23 @@ def watch_turn(state: ControlState, seen: Observation, config: ControlConfig, ev
     if state.turn.phase is Phase.MOVING:
         return _moved(state, status, events)
     goal_deg = _goal_deg(state, status)
-    turn, is_standing = watch_goal(state.turn, seen.reading.tai_s, state.intake.az_deg, goal_deg, config.azimuth)
+    tai_s, limits, scale = seen.reading.tai_s, config.azimuth, sky_scale(status.el_deg)
+    az_deg, is_goal_fixed = state.intake.az_deg, state.tracking.track is TrackState.PREPOSITION
+    turn, is_standing = watch_goal(
+        state.turn, tai_s, az_deg, goal_deg, limits, scale=scale, is_goal_fixed=is_goal_fixed
+    )
     if turn.problem and not state.turn.problem:
-        fields = {"az_deg": state.intake.az_deg, "el_deg": status.el_deg, "goal_deg": goal_deg, "problem": turn.problem}
+        fields = {"az_deg": az_deg, "el_deg": status.el_deg, "goal_deg": goal_deg, "problem": turn.problem}
         events.append(Event("azimuth.late", fields, is_warning=True))
     is_pulled = goal_deg is not None and duty_of(status) is Duty.FOLLOW and may_be_other_turn(state, config)
-    turn, is_pulled_for_good = watch_pull(turn, seen.reading.tai_s, is_pulled=is_pulled)
+    turn, is_pulled_for_good = watch_pull(
+        turn, tai_s, az_deg, _rate_deg_s(state), limits, scale=scale, is_pulled=is_pulled
+    )
     state = state if turn is state.turn else changed(state, turn=turn)
     if is_pulled_for_good:
         return doubt(state, config, events, "the azimuth moves away from its command, as it would on the other turn")
-    if is_standing and _may_doubt(state) and other_turn(state.intake.az_deg, config.azimuth) is not None:
-        return doubt(state, config, events, "the azimuth comes no nearer to its goal")
+    if is_standing and _may_doubt(state) and other_turn(az_deg, limits) is not None:
+        return doubt(state, config, events, "the azimuth moves no further towards its goal")
     return state
 
 

@@ -10,10 +10,11 @@ believed: a bearing that one turn alone reaches, a limit switch at its end, and 
     turns      | two turns |     one turn    | two turns |      from -90 to 90 a bearing is sure
 
 A place that was believed wrongly shows in two ways:
-- the register waits.  It leads its antenna by at most some degrees; where it believes a whole turn in between, it
-  stands on the antenna's own bearing, and the antenna never comes nearer to its goal (`watch_goal`);
+- the antenna stands.  At its stop, or with a register that the ACU refuses, it moves no further towards its goal
+  (`watch_goal`).  What counts is the antenna's own motion, never the gap: a path near the zenith runs away from every
+  drive, and an antenna that drives towards it as fast as it can, brakes or turns round is on no wrong turn;
 - the ACU, which knows better, cannot go on past its stop and drives the antenna the long way round: away from its
-  command, though no axis is reversed (`is_pulled_round`).
+  command, though no axis is reversed (`is_pulled_round`), and further than it needs to brake (`watch_pull`).
 Either stops the antenna and puts the other turn in the place of the believed one; control.relearn moves it then.
 """
 
@@ -21,6 +22,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from math import inf
 
+from acu_daemon.control.axis_watch import BRAKING_MARGIN
 from acu_daemon.control.changed import changed
 from acu_daemon.model import AxisLimits
 from acu_daemon.pointing.wrap import END_SLACK_DEG, encoder_continuous, is_one_turn, middle_deg, nearest_turn, turns_of
@@ -30,12 +32,13 @@ from acu_daemon.units import wrap_180
 SURE_COUNT, DENIED_COUNT = 10, 5
 BIT_MARGIN_DEG = 3.0  # so near to the middle the bit may be either
 BIT_SCORE = 20  # of readings that belie the bit (2 each, -1 for one that does not): from then on it tells nothing
-PULL_DEG_S, PULL_S = 1.0, 0.5  # so fast, for so long: no noise, and no axis that still brakes
+PULL_DEG_S, PULL_S = 1.0, 0.5  # so fast, for so long: no noise
+NOISE_DEG = 0.1  # of a reading, at most, on the sky: beside the zenith it is many degrees of azimuth
 GOAL_DEG = 2.0  # nearer than this the antenna is there
-NEARER_DEG = 1.0  # a reading so much nearer to the goal than all before it is progress
+NEARER_DEG = 1.0  # an azimuth that has moved so much towards its goal makes progress
 RATE_SHARE = 0.8  # of the drive's rate, which a move takes at least, starts and stops apart
 PATIENCE_S = 5.0  # beside the time that the drives need
-STEP_DEG = 10.0  # what a drive must come nearer by, in its own time and PATIENCE_S
+STEP_DEG = 10.0  # in the time for this and PATIENCE_S a drive makes progress
 
 
 class Phase(Enum):
@@ -61,9 +64,12 @@ class TurnWatch:
     goal_deg: float | None = None
     way_deg: float = 0.0  # to the goal, at the begin of the move
     begun_tai_s: float = inf
-    nearest_deg: float = inf
-    nearer_tai_s: float = inf
+    side: int = 0  # where the goal is, seen from the azimuth: +1, -1; 0: there
+    mark_deg: float = 0.0  # where the azimuth was when it last made progress
+    mark_tai_s: float = inf
     pulled_since_tai_s: float = inf
+    pulled_from_deg: float = 0.0
+    braking_deg: float = 0.0  # the way that it needs to brake from its speed then
     problem: str = ""  # for people, while the antenna is late
 
     @property
@@ -135,33 +141,60 @@ def is_pulled_round(az_deg: float, rate_deg_s: float, command_deg: float, limits
     return reached_deg is not None and (reached_deg - other_deg) * rate_deg_s > 0.0
 
 
-def watch_pull(watch: TurnWatch, tai_s: float, *, is_pulled: bool) -> tuple[TurnWatch, bool]:
-    """Judge one more reading: whether the antenna is pulled the other way for good."""
+def watch_pull(
+    watch: TurnWatch,
+    tai_s: float,
+    az_deg: float,
+    rate_deg_s: float,
+    limits: AxisLimits,
+    *,
+    scale: float,
+    is_pulled: bool,
+) -> tuple[TurnWatch, bool]:
+    """Judge one more reading: whether the antenna is pulled the other way for good, further than it would brake.
+
+    scale: its degrees on the sky.
+    """
     if not is_pulled:
         return (watch if watch.pulled_since_tai_s == inf else changed(watch, pulled_since_tai_s=inf)), False
-    since_tai_s = min(watch.pulled_since_tai_s, tai_s)
-    return changed(watch, pulled_since_tai_s=since_tai_s), tai_s - since_tai_s >= PULL_S
+    if watch.pulled_since_tai_s == inf:
+        braking_deg = rate_deg_s**2 * BRAKING_MARGIN / (2.0 * limits.max_acceleration_deg_s2)
+        watch = changed(watch, pulled_since_tai_s=tai_s, pulled_from_deg=az_deg, braking_deg=braking_deg)
+    is_far = abs(az_deg - watch.pulled_from_deg) > watch.braking_deg + NEARER_DEG + NOISE_DEG / scale
+    return watch, is_far and tai_s - watch.pulled_since_tai_s >= PULL_S
 
 
 def watch_goal(
-    watch: TurnWatch, tai_s: float, az_deg: float, goal_deg: float | None, limits: AxisLimits
+    watch: TurnWatch,
+    tai_s: float,
+    az_deg: float,
+    goal_deg: float | None,
+    limits: AxisLimits,
+    *,
+    scale: float,
+    is_goal_fixed: bool,
 ) -> tuple[TurnWatch, bool]:
-    """Judge one more reading of an azimuth on its way.  Returns whether it has stopped coming nearer.
+    """Judge one more reading of an azimuth on its way.  Returns whether it stands, or moves away, short of its goal.
 
-    goal_deg: where it shall go in the end, continuous; None: nowhere.  What takes longer than the drive needs is said
-    in `problem`.
+    goal_deg: where it shall go in the end, continuous; None: nowhere.  What stands, and what takes longer to a fixed
+    goal than the drive needs, is said in `problem`.  scale: degrees of azimuth on the sky.
     """
     gap_deg = inf if goal_deg is None else abs(goal_deg - az_deg)
     if goal_deg is None or gap_deg < GOAL_DEG:
         return (at_rest(watch) if watch.goal_deg is not None or watch.problem else watch), False
-    is_new = watch.goal_deg is None or abs(goal_deg - watch.goal_deg) > 90.0
-    if is_new:
-        watch = changed(at_rest(watch), way_deg=gap_deg, begun_tai_s=tai_s, nearest_deg=inf)
-    if gap_deg < watch.nearest_deg - NEARER_DEG:
-        watch = changed(watch, nearest_deg=gap_deg, nearer_tai_s=tai_s)
+    side = 1 if goal_deg > az_deg else -1
+    if watch.goal_deg is None or side != watch.side or abs(goal_deg - watch.goal_deg) > 90.0:
+        watch = changed(
+            at_rest(watch), way_deg=gap_deg, begun_tai_s=tai_s, side=side, mark_deg=az_deg, mark_tai_s=tai_s
+        )
+    moved_deg = side * (az_deg - watch.mark_deg)
+    if moved_deg > NEARER_DEG:
+        watch = changed(watch, mark_deg=az_deg, mark_tai_s=tai_s)
+    elif moved_deg < -GOAL_DEG - 2.0 * NOISE_DEG / scale:  # it brakes: from where it turns round it shall come on
+        watch = changed(watch, mark_deg=az_deg)
     watch = changed(watch, goal_deg=goal_deg)
-    is_standing = tai_s - watch.nearer_tai_s > PATIENCE_S + drive_s(STEP_DEG, limits)
-    is_late = tai_s - watch.begun_tai_s > PATIENCE_S + drive_s(watch.way_deg, limits)
+    is_standing = tai_s - watch.mark_tai_s > PATIENCE_S + drive_s(STEP_DEG, limits)
+    is_late = is_goal_fixed and tai_s - watch.begun_tai_s > PATIENCE_S + drive_s(watch.way_deg, limits)
     if not (is_standing or is_late) or watch.problem:
         return watch, is_standing
     turn = "" if is_one_turn(limits) else f", {half_text(az_deg, limits)}"
@@ -208,4 +241,4 @@ def corrected(watch: TurnWatch) -> TurnWatch:
 
 def at_rest(watch: TurnWatch) -> TurnWatch:
     """Forget the way to the goal: it begins anew."""
-    return changed(watch, goal_deg=None, way_deg=0.0, begun_tai_s=inf, nearest_deg=inf, nearer_tai_s=inf, problem="")
+    return changed(watch, goal_deg=None, way_deg=0.0, begun_tai_s=inf, side=0, mark_tai_s=inf, problem="")

@@ -63,7 +63,7 @@ class Snapshot:
     encoder_problem: str = ""
     clock_alarm: str = ""
     line_alarm: str = ""
-    turn_alarm: str = ""  # an azimuth that comes no nearer to its goal, a sector bit that is wrong
+    turn_alarm: str = ""  # an azimuth that does not come to its goal, a sector bit that is wrong
     files_alarm: str = ""  # what cannot be written: recording, state
     limit_alarm: str = ""  # which axis is held at its limit: the satellite is beyond it
     limited_count: int = 0  # writes that were held at a limit
