@@ -12,7 +12,7 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import ValidationError
 
-from acu_daemon.assist.estimator import EstimatorSettings
+from acu_daemon.assist.estimators.estimator import EstimatorSettings
 from acu_daemon.assist.settings import StateSigmas
 from acu_daemon.config_problems import in_words
 from acu_daemon.config_tables import SatelliteFile, Section, StationFile, UncertaintySection

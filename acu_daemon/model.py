@@ -146,7 +146,7 @@ class FitResult:
     across_deg: float  # and across it, seen from the station, right of the motion positive
     bias: AngleBias = AngleBias()
     station_shift_enu_m: tuple[float, float, float] = (0.0, 0.0, 0.0)  # the station's true place minus the given one
-    covariance: Array | None = field(default=None, compare=False, repr=False)  # (13, 13), see assist.full_states
+    covariance: Array | None = field(default=None, compare=False, repr=False)  # (13, 13), see full.estimated_states
 
 
 MOST_DEG = 1e5  # more is no azimuth, however often the path goes round, and no rate

@@ -28,9 +28,9 @@ from tables.console import progress
 from tables.outputs import output_file
 from tables.workers import run_script
 
-from acu_daemon.assist.estimator import EstimatorSettings, make_estimator
-from acu_daemon.assist.inversion import KnownElements, direction_cosines, invert
-from acu_daemon.assist.prediction import predict
+from acu_daemon.assist.estimators.estimator import EstimatorSettings, make_estimator
+from acu_daemon.assist.estimators.inversion import KnownElements, direction_cosines, invert
+from acu_daemon.assist.session.prediction import predict
 from acu_daemon.cli import demo
 from acu_daemon.cli.options import Target, load_target
 from acu_daemon.cli.virtual_pass import Flight, fly

@@ -23,10 +23,10 @@ from tables.seed_001 import sky_angles_deg
 from tables.skies import Sky, readings_of, real_elements, real_sky
 from tables.workers import run_script
 
-from acu_daemon.assist.carry_over import CarryOver, aged_prior, carry_over_of, first_fit, why_not
-from acu_daemon.assist.encoder import encoder_look, sigma_deg
-from acu_daemon.assist.full import FullEstimator
-from acu_daemon.assist.full_states import ORBIT, STATE_COUNT
+from acu_daemon.assist.estimators.full.carry_over import CarryOver, aged_prior, carry_over_of, first_fit, why_not
+from acu_daemon.assist.estimators.full.estimated_states import ORBIT, STATE_COUNT
+from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
+from acu_daemon.assist.mount_model import encoder_look, sigma_deg
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import AngleBias, FitResult, Readings, Site
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator

@@ -20,9 +20,9 @@ from real_pass import truth_path
 from tables.skies import real_elements, real_sky
 from tables.workers import run_script
 
-from acu_daemon.assist.encoder import encoder_look
-from acu_daemon.assist.full import FullEstimator
-from acu_daemon.assist.gate import (
+from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
+from acu_daemon.assist.mount_model import encoder_look
+from acu_daemon.assist.reading_gate import (
     ABOVE_MAX_ELEVATION,
     ACCELERATION,
     DWELL,

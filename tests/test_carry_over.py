@@ -14,7 +14,8 @@ from made_orbits import circular, site, visible
 from real_passes import noisy, sky_angles_deg
 from script_modules import load
 
-from acu_daemon.assist.carry_over import (
+from acu_daemon.assist.estimators.estimator import ESTIMATORS, has_covariance
+from acu_daemon.assist.estimators.full.carry_over import (
     LONGEST_S,
     CarryOver,
     aged_prior,
@@ -23,12 +24,11 @@ from acu_daemon.assist.carry_over import (
     why_not,
     why_not_resume,
 )
-from acu_daemon.assist.encoder import encoder_look
-from acu_daemon.assist.estimator import ESTIMATORS, has_covariance
-from acu_daemon.assist.full import FullEstimator
-from acu_daemon.assist.full_points import sights
-from acu_daemon.assist.full_states import BIAS, ORBIT, Prior, make_prior
-from acu_daemon.assist.innovation import Denial
+from acu_daemon.assist.estimators.full.carry_over_test import Denial
+from acu_daemon.assist.estimators.full.estimated_states import BIAS, ORBIT, Prior, make_prior
+from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
+from acu_daemon.assist.estimators.full.normal_points import sights
+from acu_daemon.assist.mount_model import encoder_look
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings
 from acu_daemon.control.refit import RefitRequest, RefitSetup, Refitter
 from acu_daemon.edge.fit import InlineFitRunner

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from structlog.testing import capture_logs
 
-from acu_daemon.assist.carry_over import CarryOver
+from acu_daemon.assist.estimators.full.carry_over import CarryOver
 from acu_daemon.edge import carry_over as edge
 from acu_daemon.edge.carry_over import FitKeeper, carry_over_path, read_carry_over, write_carry_over
 from acu_daemon.edge.writer import Writer

@@ -13,7 +13,7 @@ from config_files import STATION, from_file, replaced, write
 from conftest import DATA, needs_data
 from real_passes import RealPass, noisy, sky_angles_deg
 
-from acu_daemon.assist.estimator import ESTIMATORS
+from acu_daemon.assist.estimators.estimator import ESTIMATORS
 from acu_daemon.control.comparison import compare
 from acu_daemon.control.replay import Replayed
 from acu_daemon.control.states import TrackState

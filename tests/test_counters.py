@@ -13,8 +13,8 @@ from test_daemon_events import climb, events_named
 from test_latch_file import TEXT, NoonClock
 from test_writer import PATIENT_S, stuck
 
-from acu_daemon.assist.gate import OUTLIER
-from acu_daemon.assist.kalman import Estimate, FilterState, linearise, sweep
+from acu_daemon.assist.estimators.kalman import Estimate, FilterState, linearise, sweep
+from acu_daemon.assist.reading_gate import OUTLIER
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.control.refit import RefitReply, RefitRequest
 from acu_daemon.edge import recording as recording_file

@@ -13,7 +13,7 @@ from skyfield.api import load
 from skyfield.framelib import ICRS_to_J2000
 from skyfield.sgp4lib import TEME
 
-from acu_daemon.assist.estimator import EstimatorSettings, make_estimator
+from acu_daemon.assist.estimators.estimator import EstimatorSettings, make_estimator
 from acu_daemon.errors import ElementsError, OrbitError
 from acu_daemon.model import Correction, EarthOrientation, Readings, Site, Station
 from acu_daemon.orbit.frames import enu_from_itrs, itrs_from_teme, station_itrs_m

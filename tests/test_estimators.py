@@ -1,13 +1,13 @@
-"""assist.estimator: what all estimators do, and the two that average inversions."""
+"""assist.estimators.estimator: what all estimators do, and the two that average inversions."""
 
 import numpy as np
 import pytest
 from made_orbits import EPOCH_TAI_S, circular, site, visible
 from real_passes import noisy, sky_angles_deg
 
-from acu_daemon.assist.base import for_people
-from acu_daemon.assist.estimator import ESTIMATORS, EstimatorSettings, make_estimator
-from acu_daemon.assist.inversion import BEYOND_LATITUDE
+from acu_daemon.assist.estimators.estimator import ESTIMATORS, EstimatorSettings, make_estimator
+from acu_daemon.assist.estimators.estimator_base import for_people
+from acu_daemon.assist.estimators.inversion import BEYOND_LATITUDE
 from acu_daemon.errors import UsageError
 from acu_daemon.model import Correction, Readings
 from acu_daemon.orbit.look import look_at

@@ -5,13 +5,13 @@ import pytest
 from made_orbits import EPOCH_TAI_S, circular, site
 from real_passes import sky_angles_deg
 
-from acu_daemon.assist.full_path import Curve
-from acu_daemon.assist.full_points import residuals, sights
-from acu_daemon.assist.full_states import STATE_COUNT
-from acu_daemon.assist.gate import OUTLIER, TOO_FAST, ReadingGate
-from acu_daemon.assist.inversion import KnownElements, direction_cosines, invert
-from acu_daemon.assist.kalman import Estimate, FilterState, linearise, sweep
-from acu_daemon.assist.offsets import angles_deg, offsets
+from acu_daemon.assist.estimators.full.estimated_states import STATE_COUNT
+from acu_daemon.assist.estimators.full.normal_points import residuals, sights
+from acu_daemon.assist.estimators.full.path_partials import Curve
+from acu_daemon.assist.estimators.inversion import KnownElements, direction_cosines, invert
+from acu_daemon.assist.estimators.kalman import Estimate, FilterState, linearise, sweep
+from acu_daemon.assist.reading_gate import OUTLIER, TOO_FAST, ReadingGate
+from acu_daemon.assist.screening.offsets import angles_deg, offsets
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import AxisLimits, Readings, Site, Station, sky_angle_deg
 from acu_daemon.orbit.frames import itrs_from_teme, station_itrs_m

@@ -9,9 +9,16 @@ import pytest
 from made_orbits import EPOCH_TAI_S, circular, site, visible
 from real_passes import noisy, sky_angles_deg
 
-from acu_daemon.assist.encoder import encoder_look, sky_covariance
-from acu_daemon.assist.full import FullEstimator
-from acu_daemon.assist.full_states import STATE_COUNT, bias_of, correction_of, make_prior, shift_of, states_of
+from acu_daemon.assist.estimators.full.estimated_states import (
+    STATE_COUNT,
+    bias_of,
+    correction_of,
+    make_prior,
+    shift_of,
+    states_of,
+)
+from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
+from acu_daemon.assist.mount_model import encoder_look, sky_covariance
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings
 from acu_daemon.model import Readings
 from acu_daemon.orbit.frames import itrs_from_teme
@@ -38,7 +45,7 @@ STATION_SIGMA_M = 2000.0
 ORBIT = (0.05 * DEG, 0.3 * DEG, 2e-5 / 60.0, 2e-4, 2e-4, 0.05 * DEG)
 BIASES = (0.11 * DEG, 0.07 * DEG, 0.13 * DEG, 0.05 * DEG)
 STATION_M = (2000.0, 2000.0, 200.0)  # heights are known ten times as well as places
-SIGMAS = np.array([*ORBIT, *BIASES, *STATION_M])  # in the order of assist.full_states
+SIGMAS = np.array([*ORBIT, *BIASES, *STATION_M])  # in the order of assist.estimators.full.estimated_states
 NAMES = (
     *("raan", "mean anomaly", "mean motion", "e cos argp", "e sin argp", "inclination"),
     *("azimuth", "azimuth / cos h", "elevation", "elevation x cot h", "east", "north", "up"),

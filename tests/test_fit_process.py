@@ -13,7 +13,7 @@ import made_orbits
 import numpy as np
 import pytest
 
-from acu_daemon.assist.estimator import ESTIMATORS, EstimatorSettings
+from acu_daemon.assist.estimators.estimator import ESTIMATORS, EstimatorSettings
 from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup
 from acu_daemon.edge.fit import FitFailedError, InlineFitRunner, ProcessFitRunner
 from acu_daemon.edge.fit_child import LENGTH

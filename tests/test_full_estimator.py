@@ -11,12 +11,18 @@ from made_orbits import EPOCH_TAI_S, circular, site, visible
 from real_passes import noisy, sky_angles_deg
 
 from acu_daemon.assist import encoder
-from acu_daemon.assist.encoder import encoder_look, sigma_deg, sky_covariance
-from acu_daemon.assist.full import FullEstimator, shift_for_people
-from acu_daemon.assist.full_path import moved_site, node_times, orbit_partials_itrs, path_itrs, sky_partials
-from acu_daemon.assist.full_states import STATE_COUNT, STEPS, correction_of, make_prior, states_of
-from acu_daemon.assist.gate import ABOVE_MAX_ELEVATION
-from acu_daemon.assist.prediction import predict
+from acu_daemon.assist.estimators.full.estimated_states import STATE_COUNT, STEPS, correction_of, make_prior, states_of
+from acu_daemon.assist.estimators.full.full_estimator import FullEstimator, shift_for_people
+from acu_daemon.assist.estimators.full.path_partials import (
+    moved_site,
+    node_times,
+    orbit_partials_itrs,
+    path_itrs,
+    sky_partials,
+)
+from acu_daemon.assist.mount_model import encoder_look, sigma_deg, sky_covariance
+from acu_daemon.assist.reading_gate import ABOVE_MAX_ELEVATION
+from acu_daemon.assist.session.prediction import predict
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings, StateSigmas
 from acu_daemon.control.refit import RefitRequest, RefitSetup, Refitter
 from acu_daemon.model import AngleBias, AxisLimits, Correction, Readings

@@ -8,7 +8,7 @@ import pytest
 from flights import RISING_TAI_S, climb, demo_target, events_named, register_errors_deg, rows_between, sky_of
 from test_live_line import SEEN
 
-from acu_daemon.assist.gate import DWELL, SIDE_LOBE, WRONG_TARGET
+from acu_daemon.assist.reading_gate import DWELL, SIDE_LOBE, WRONG_TARGET
 from acu_daemon.cli.virtual_pass import Flight, Stage
 from acu_daemon.daemon.live import live_text
 from acu_daemon.sim.receiver import HALF_POWER_DB, SIDE_LOBE_BEAMS, SIDE_LOBE_DB, pattern_db

@@ -1,9 +1,9 @@
-"""assist.inversion: azimuth and elevation to node and mean anomaly, Kuga and Carrara 1990 eqs 1-16."""
+"""assist.estimators.inversion: azimuth and elevation to node and mean anomaly, Kuga and Carrara 1990 eqs 1-16."""
 
 import numpy as np
 import pytest
 
-from acu_daemon.assist.inversion import (
+from acu_daemon.assist.estimators.inversion import (
     BEYOND_LATITUDE,
     NO_INTERSECTION,
     KnownElements,

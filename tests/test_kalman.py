@@ -1,4 +1,4 @@
-"""assist.kalman: Kuga and Carrara 1988, section 4."""
+"""assist.estimators.kalman: Kuga and Carrara 1988, section 4."""
 
 import numpy as np
 import pytest
@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from made_orbits import circular, site, visible
 from real_passes import noisy
 
-from acu_daemon.assist.estimator import EstimatorSettings, make_estimator
-from acu_daemon.assist.gate import OUTLIER
-from acu_daemon.assist.kalman import Estimate, KalmanEstimator, initial_estimate, linearise, update
+from acu_daemon.assist.estimators.estimator import EstimatorSettings, make_estimator
+from acu_daemon.assist.estimators.kalman import Estimate, KalmanEstimator, initial_estimate, linearise, update
+from acu_daemon.assist.reading_gate import OUTLIER
 from acu_daemon.assist.settings import DAEMON, SEED, KalmanTuning
 from acu_daemon.model import Correction, Readings
 from acu_daemon.orbit.look import look_at

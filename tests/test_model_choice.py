@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from made_orbits import circular, site, visible
 
-from acu_daemon.assist.carry_over import CarryOver, carry_over_of
-from acu_daemon.assist.gate import BELIED, WRONG_TARGET
-from acu_daemon.assist.model_choice import ModelChoice, choose, newest_residual_deg
+from acu_daemon.assist.estimators.full.carry_over import CarryOver, carry_over_of
+from acu_daemon.assist.reading_gate import BELIED, WRONG_TARGET
+from acu_daemon.assist.session.model_choice import ModelChoice, choose, newest_residual_deg
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.control.refit import CARRIED_S, DROPPED, RefitReply, RefitRequest, RefitSetup, Refitter
 from acu_daemon.model import AxisLimits, Correction, FitResult, Model, Readings

@@ -11,7 +11,7 @@ from memories import remembering
 from test_daemon_events import NeverFitting
 from test_tick import AZ_DEG, CONFIG, EL_DEG, NOW, PLAN, SKY, ready, saw, status
 
-from acu_daemon.assist.prediction import predict
+from acu_daemon.assist.session.prediction import predict
 from acu_daemon.control.state import ControlState, PathOffset
 from acu_daemon.control.states import TrackState
 from acu_daemon.control.tick import tick

@@ -1,4 +1,4 @@
-"""assist.prediction: the buffer, continuous through north and zenith, smooth and exact between its samples."""
+"""assist.session.prediction: the buffer, continuous through north and zenith, smooth and exact between its samples."""
 
 from functools import partial
 
@@ -7,7 +7,7 @@ import pytest
 from made_orbits import EPOCH_TAI_S, circular, site
 from real_passes import sky_angles_deg
 
-from acu_daemon.assist.prediction import predict
+from acu_daemon.assist.session.prediction import predict
 from acu_daemon.model import AxisLimits
 from acu_daemon.orbit.look import look_at
 from acu_daemon.pointing.keyhole import follow_path, longest_window_s

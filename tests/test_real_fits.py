@@ -9,7 +9,7 @@ from conftest import DATA, needs_data
 from real_passes import noisy, sky_angles_deg
 from script_modules import load
 
-from acu_daemon.assist.estimator import EstimatorSettings, make_estimator
+from acu_daemon.assist.estimators.estimator import EstimatorSettings, make_estimator
 from acu_daemon.model import Readings, Site, Station
 from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.passes import find_passes

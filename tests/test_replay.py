@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from real_passes import noisy, sky_angles_deg
 
-from acu_daemon.assist.estimator import ESTIMATORS, EstimatorSettings
+from acu_daemon.assist.estimators.estimator import ESTIMATORS, EstimatorSettings
 from acu_daemon.control.refit import RefitRequest, RefitSetup, Refitter
 from acu_daemon.control.replay import Replayed, replay
 from acu_daemon.control.states import TrackState

@@ -12,8 +12,8 @@ from config_files import BROUWER, STATION, replaced, write
 from memories import remembering
 from structlog.testing import capture_logs
 
-from acu_daemon.assist.carry_over import CarryOver
-from acu_daemon.assist.estimator import ESTIMATORS
+from acu_daemon.assist.estimators.estimator import ESTIMATORS
+from acu_daemon.assist.estimators.full.carry_over import CarryOver
 from acu_daemon.cli.kept import Kept, open_kept
 from acu_daemon.cli.options import coming_pass, load_target
 from acu_daemon.config import estimator_settings

@@ -9,8 +9,8 @@ from conftest import needs_data
 from made_orbits import circular, site, visible
 from real_passes import noisy, sky_angles_deg
 
-from acu_daemon.assist.encoder import encoder_look
-from acu_daemon.assist.gate import (
+from acu_daemon.assist.mount_model import encoder_look
+from acu_daemon.assist.reading_gate import (
     ABOVE_MAX_ELEVATION,
     ACCELERATION,
     BELIED,

@@ -1,1 +1,1 @@
-"""Assisted tracking proper: inversion, estimators, gate of readings, prediction buffer.  Pure."""
+"""Assisted tracking: estimators of the orbit, screening of readings, and the estimation session of a pass.  Pure."""

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from acu_daemon.assist.gate import Dwell
+from acu_daemon.assist.reading_gate import Dwell
 from acu_daemon.cli.groundtrack_elements import AsJson, Csv, CycleText, Plot, parsed_cycle, write_csv
 from acu_daemon.cli.options import Config, Satellite, load_target
 from acu_daemon.cli.outputs import refuse_unwritable

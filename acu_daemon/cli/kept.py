@@ -9,8 +9,8 @@ from typing import Any
 
 import structlog
 
-from acu_daemon.assist.carry_over import CarryOver, carry_over_of, resume_of, why_not, why_not_resume
-from acu_daemon.assist.estimator import has_covariance
+from acu_daemon.assist.estimators.estimator import has_covariance
+from acu_daemon.assist.estimators.full.carry_over import CarryOver, carry_over_of, resume_of, why_not, why_not_resume
 from acu_daemon.cli.options import Target
 from acu_daemon.config import estimator_settings
 from acu_daemon.control.state import ControlState, Held, remembered

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from acu_daemon.assist.estimator import ESTIMATORS
+from acu_daemon.assist.estimators.estimator import ESTIMATORS
 from acu_daemon.cli.options import SPARE_S, Config, Satellite, Target, lacking, load_target, whose_recording
 from acu_daemon.cli.outputs import refuse_unwritable
 from acu_daemon.config import estimator_settings

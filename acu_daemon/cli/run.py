@@ -17,7 +17,7 @@ import structlog
 import typer
 
 from acu_daemon import PROCESS_START_S
-from acu_daemon.assist.carry_over import CarryOver
+from acu_daemon.assist.estimators.full.carry_over import CarryOver
 from acu_daemon.cli.clock_wait import wait_for_clock
 from acu_daemon.cli.elements_watch import ElementsWatch
 from acu_daemon.cli.kept import Kept, open_kept

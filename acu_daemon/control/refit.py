@@ -7,15 +7,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from acu_daemon.assist.carry_over import CarryOver, aged_prior, first_fit
-from acu_daemon.assist.estimator import Estimator, EstimatorSettings, has_covariance, make_estimator
-from acu_daemon.assist.full import FullEstimator, shift_for_people
-from acu_daemon.assist.gate import OUTLIER
-from acu_daemon.assist.model_choice import ModelChoice, choose, is_good, newest_residual_deg
-from acu_daemon.assist.prediction import predict
-from acu_daemon.assist.spans import span_s
-from acu_daemon.assist.spread import spread_of
-from acu_daemon.assist.track_gate import TrackGate
+from acu_daemon.assist.estimators.estimator import Estimator, EstimatorSettings, has_covariance, make_estimator
+from acu_daemon.assist.estimators.full.carry_over import CarryOver, aged_prior, first_fit
+from acu_daemon.assist.estimators.full.full_estimator import FullEstimator, shift_for_people
+from acu_daemon.assist.reading_gate import OUTLIER
+from acu_daemon.assist.reading_spans import span_s
+from acu_daemon.assist.screening.track_gate import TrackGate
+from acu_daemon.assist.session.model_choice import ModelChoice, choose, is_good, newest_residual_deg
+from acu_daemon.assist.session.prediction import predict
+from acu_daemon.assist.session.prediction_spread import spread_of
 from acu_daemon.model import AxisLimits, FitResult, Model, Prediction, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.pointing.keyhole import follow_path, longest_window_s
@@ -31,7 +31,7 @@ DROPPED = "the last pass's orbit is dropped: the fits that began with it stayed 
 class RefitSetup:
     """Everything that stays the same during a pass; it is sent to the child process once.
 
-    carried: what an earlier pass left, accepted (assist.carry_over), which only estimators with a covariance use; or
+    carried: what an earlier pass left and was accepted, which only estimators with a covariance use; or
     the fit of this pass that the daemon had when it was started again: it goes on from it.
     """
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from acu_daemon.assist.gate import DWELL, Dwell
+from acu_daemon.assist.reading_gate import DWELL, Dwell
 from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup, Refitter
 from acu_daemon.control.states import TrackState
 from acu_daemon.model import FitResult, Reading, Readings

@@ -8,7 +8,7 @@ from typing import Any
 
 import structlog
 
-from acu_daemon.assist.gate import ABOVE_MAX_ELEVATION
+from acu_daemon.assist.reading_gate import ABOVE_MAX_ELEVATION
 from acu_daemon.control.approach import lead_s
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.finite import is_fit

@@ -6,7 +6,7 @@ from typing import Any
 
 import structlog
 
-from acu_daemon.assist.gate import Dwell
+from acu_daemon.assist.reading_gate import Dwell
 from acu_daemon.control.arming import owes_stop
 from acu_daemon.control.causes import LINK_SILENCE_S, is_acquired
 from acu_daemon.control.changed import changed

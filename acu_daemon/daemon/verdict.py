@@ -7,7 +7,7 @@ prediction says, STOPPED that the readings stand still.  That the satellite is t
 from dataclasses import dataclass
 from enum import IntEnum
 
-from acu_daemon.assist.gate import ABOVE_MAX_ELEVATION
+from acu_daemon.assist.reading_gate import ABOVE_MAX_ELEVATION
 from acu_daemon.control.states import AUTOTRACKING, HOLDING, TrackState
 from acu_daemon.daemon.snapshot import Snapshot
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import structlog
 
-from acu_daemon.assist.carry_over import CarryOver
-from acu_daemon.assist.full_states import STATE_COUNT
+from acu_daemon.assist.estimators.full.carry_over import CarryOver
+from acu_daemon.assist.estimators.full.estimated_states import STATE_COUNT
 from acu_daemon.edge.writer import Latest, Writer, replace_file
 from acu_daemon.errors import OrbitError
 from acu_daemon.model import AngleBias, Correction, FitResult, Station

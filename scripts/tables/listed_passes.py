@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 from real_pass import PASSES
 
-from acu_daemon.assist.full_states import correction_of, make_prior
+from acu_daemon.assist.estimators.full.estimated_states import correction_of, make_prior
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.errors import OrbitError
 from acu_daemon.model import Correction, Pass, Site, Station

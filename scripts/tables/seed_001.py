@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from acu_daemon.assist.encoder import encoder_look
-from acu_daemon.assist.estimator import make_estimator
+from acu_daemon.assist.estimators.estimator import make_estimator
+from acu_daemon.assist.mount_model import encoder_look
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings
 from acu_daemon.model import Readings
 from acu_daemon.orbit.brouwer import BrouwerElements, BrouwerPropagator

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from acu_daemon.assist.estimator import make_estimator
-from acu_daemon.assist.full_path import moved_site
+from acu_daemon.assist.estimators.estimator import make_estimator
+from acu_daemon.assist.estimators.full.path_partials import moved_site
 from acu_daemon.model import FitResult, Readings, Site
 from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.propagator import Propagator

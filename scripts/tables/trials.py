@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acu_daemon.assist.encoder import encoder_look, sky_covariance
-from acu_daemon.assist.full import FullEstimator
-from acu_daemon.assist.full_path import node_times, orbit_partials_itrs, site_of, sky_partials
-from acu_daemon.assist.full_states import states_of
+from acu_daemon.assist.estimators.full.estimated_states import states_of
+from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
+from acu_daemon.assist.estimators.full.path_partials import node_times, orbit_partials_itrs, site_of, sky_partials
+from acu_daemon.assist.mount_model import encoder_look, sky_covariance
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import FitResult, Readings, Site
 from acu_daemon.orbit.propagator import Propagator

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from flights import RISING_TAI_S, demo_target
 
-from acu_daemon.assist.full_states import correction_of, make_prior
-from acu_daemon.assist.prediction import predict
+from acu_daemon.assist.estimators.full.estimated_states import correction_of, make_prior
+from acu_daemon.assist.session.prediction import predict
+from acu_daemon.assist.session.prediction_spread import spread_of
 from acu_daemon.assist.settings import EstimatorSettings, StateSigmas
-from acu_daemon.assist.spread import spread_of
 from acu_daemon.control.track_frame import offset_of
 from acu_daemon.model import Correction, FitResult
 from acu_daemon.orbit.look import look_at

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from acu_daemon.assist.encoder import encoder_look
-from acu_daemon.assist.offsets import Flags, propagator_of
+from acu_daemon.assist.mount_model import encoder_look
+from acu_daemon.assist.screening.offsets import Flags, propagator_of
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import FitResult, Site
 from acu_daemon.orbit.propagator import Propagator

@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from acu_daemon.assist.gate import ACCELERATION, OFF_PATH
-from acu_daemon.assist.judge import Judge
-from acu_daemon.assist.offsets import Flags, Offsets
+from acu_daemon.assist.reading_gate import ACCELERATION, OFF_PATH
+from acu_daemon.assist.screening.offsets import Flags, Offsets
+from acu_daemon.assist.screening.orbit_test import Judge
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import Readings
 

@@ -9,7 +9,7 @@ from math import exp, hypot, radians
 
 import numpy as np
 
-from acu_daemon.assist.full_states import (
+from acu_daemon.assist.estimators.full.estimated_states import (
     BIAS,
     ORBIT,
     STATE_COUNT,
@@ -21,8 +21,8 @@ from acu_daemon.assist.full_states import (
     shift_of,
     states_of,
 )
+from acu_daemon.assist.estimators.full.prior_inflation import WIDTHS
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings, StateSigmas
-from acu_daemon.assist.widening import WIDTHS
 from acu_daemon.errors import OrbitError
 from acu_daemon.model import AngleBias, Correction, FitResult, Site, Station
 from acu_daemon.orbit.kepler import osculating_from_state
@@ -63,7 +63,7 @@ class CarryOver:
     correction: Correction
     bias: AngleBias
     station_shift_enu_m: tuple[float, float, float]
-    covariance: Array = field(compare=False, repr=False)  # (13, 13), see full_states
+    covariance: Array = field(compare=False, repr=False)  # (13, 13), see estimated_states
     is_of_this_pass: bool = False  # of the pass in progress, left by a daemon that was started again: it does not age
 
 

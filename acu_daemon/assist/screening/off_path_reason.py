@@ -4,8 +4,8 @@ from math import hypot
 
 import numpy as np
 
-from acu_daemon.assist.gate import OFF_PATH, SIDE_LOBE, WRONG_TARGET
-from acu_daemon.assist.offsets import Flags, Offsets
+from acu_daemon.assist.reading_gate import OFF_PATH, SIDE_LOBE, WRONG_TARGET
+from acu_daemon.assist.screening.offsets import Flags, Offsets
 from acu_daemon.model import Readings
 
 SIDE_LOBE_BEAMS = (1.05, 2.2)  # around the 1.2 to 2 of a side lobe: noise and the path's own error

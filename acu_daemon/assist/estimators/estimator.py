@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from typing import Protocol
 
-from acu_daemon.assist.averages import CircularEstimator, DeterministicEstimator
-from acu_daemon.assist.carry_over import CarryOver
-from acu_daemon.assist.full import FullEstimator
-from acu_daemon.assist.kalman import KalmanEstimator
+from acu_daemon.assist.estimators.averages import CircularEstimator, DeterministicEstimator
+from acu_daemon.assist.estimators.full.carry_over import CarryOver
+from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
+from acu_daemon.assist.estimators.kalman import KalmanEstimator
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.errors import UsageError
 from acu_daemon.model import FitResult, Readings, Site

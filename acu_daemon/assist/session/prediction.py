@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from acu_daemon.assist.encoder import encoder_look, sigma_deg
+from acu_daemon.assist.mount_model import encoder_look, sigma_deg
 from acu_daemon.model import FitResult, Prediction, PredictionKind, Site
 from acu_daemon.orbit.frames import enu_from_itrs, station_itrs_m
 from acu_daemon.orbit.look import Look, look_along

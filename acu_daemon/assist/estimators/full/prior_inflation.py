@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from acu_daemon.assist.full_points import Sights
-from acu_daemon.assist.full_solve import Problem, Solution, solve
-from acu_daemon.assist.full_states import ORBIT
+from acu_daemon.assist.estimators.full.estimated_states import ORBIT
+from acu_daemon.assist.estimators.full.least_squares import Problem, Solution, solve
+from acu_daemon.assist.estimators.full.normal_points import Sights
 from acu_daemon.units import DEG, Array
 
 STRAIN_LIMIT = 8.0  # sigmas squared, of six orbit states and the biases; the evidence then decides

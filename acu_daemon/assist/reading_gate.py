@@ -1,6 +1,6 @@
 """Which readings are fit to be used: the dwell after acquisition, and plain reasons to leave a reading out.  Pure.
 
-What only an orbit can tell is in assist.track_gate.
+What only an orbit can tell is in assist.screening.track_gate.
 """
 
 from collections.abc import Iterable

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from acu_daemon.assist.full_path import Curve, cot_el, enu_m
-from acu_daemon.assist.full_states import BIAS
+from acu_daemon.assist.estimators.full.estimated_states import BIAS
+from acu_daemon.assist.estimators.full.path_partials import Curve, cot_el, enu_m
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import Readings, Site
 from acu_daemon.units import DEG, Array

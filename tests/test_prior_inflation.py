@@ -7,13 +7,13 @@ import pytest
 from made_orbits import circular, site, visible
 from real_passes import noisy, sky_angles_deg
 
-from acu_daemon.assist.encoder import encoder_look, sigma_deg
-from acu_daemon.assist.estimator import make_estimator
-from acu_daemon.assist.full import FullEstimator
-from acu_daemon.assist.full_states import make_prior
+from acu_daemon.assist.estimators.estimator import make_estimator
+from acu_daemon.assist.estimators.full.elements_discrepancy import why_far
+from acu_daemon.assist.estimators.full.estimated_states import make_prior
+from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
+from acu_daemon.assist.estimators.full.prior_inflation import WIDTHS
+from acu_daemon.assist.mount_model import encoder_look, sigma_deg
 from acu_daemon.assist.settings import BROUWER_SIGMAS, OEM_SIGMAS, ElementSigmas, EstimatorSettings, StateSigmas
-from acu_daemon.assist.why_far import why_far
-from acu_daemon.assist.widening import WIDTHS
 from acu_daemon.control.refit import RefitRequest, RefitSetup, Refitter
 from acu_daemon.model import AngleBias, AxisLimits, Correction, FitResult, Readings
 from acu_daemon.orbit.look import look_at

@@ -11,8 +11,8 @@ from math import pi
 
 import numpy as np
 
-from acu_daemon.assist.base import BaseEstimator
-from acu_daemon.assist.inversion import Inversion, KnownElements, direction_cosines, invert
+from acu_daemon.assist.estimators.estimator_base import BaseEstimator
+from acu_daemon.assist.estimators.inversion import Inversion, KnownElements, direction_cosines, invert
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import Correction, Readings, Site
 from acu_daemon.orbit.frames import station_itrs_m

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acu_daemon.assist.offsets import angles_deg
+from acu_daemon.assist.screening.offsets import angles_deg
 from acu_daemon.model import FitResult, Model, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
 

@@ -5,8 +5,8 @@ from math import cos, hypot, radians
 
 import numpy as np
 
-from acu_daemon.assist.encoder import sky_covariance
-from acu_daemon.assist.full_states import make_prior
+from acu_daemon.assist.estimators.full.estimated_states import make_prior
+from acu_daemon.assist.mount_model import sky_covariance
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import Correction, FitResult, Prediction, Site
 from acu_daemon.orbit.propagator import Propagator

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import numpy.typing as npt
 
-from acu_daemon.assist.encoder import encoder_look, sigma_deg
+from acu_daemon.assist.mount_model import encoder_look, sigma_deg
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import FitResult, Readings, Site
 from acu_daemon.orbit.look import Look, look_along

@@ -1,10 +1,10 @@
-"""assist.gate: the dwell, and the plain reasons to leave a reading out."""
+"""assist.reading_gate: the dwell, and the plain reasons to leave a reading out."""
 
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acu_daemon.assist.gate import ABOVE_MAX_ELEVATION, TOO_FAST, Dwell, ReadingGate, locked_readings
+from acu_daemon.assist.reading_gate import ABOVE_MAX_ELEVATION, TOO_FAST, Dwell, ReadingGate, locked_readings
 from acu_daemon.model import AxisLimits, Reading, Readings
 
 AZIMUTH = AxisLimits(-270.0, 270.0, 20.0, 10.0)

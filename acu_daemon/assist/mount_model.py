@@ -8,7 +8,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from acu_daemon.assist.full_path import (
+from acu_daemon.assist.estimators.full.estimated_states import ORBIT, STATE_COUNT, STATION, STEPS, states_of
+from acu_daemon.assist.estimators.full.path_partials import (
     Curve,
     cot_el,
     moved_site,
@@ -18,7 +19,6 @@ from acu_daemon.assist.full_path import (
     site_of,
     sky_partials,
 )
-from acu_daemon.assist.full_states import ORBIT, STATE_COUNT, STATION, STEPS, states_of
 from acu_daemon.model import AngleBias, Correction, FitResult, Site
 from acu_daemon.orbit.look import Look, look_at
 from acu_daemon.orbit.propagator import Propagator

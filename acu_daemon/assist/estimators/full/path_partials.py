@@ -5,7 +5,7 @@ from math import cos, radians
 
 import numpy as np
 
-from acu_daemon.assist.full_states import ORBIT_COUNT, STATE_COUNT, STEPS, correction_of, shift_of
+from acu_daemon.assist.estimators.full.estimated_states import ORBIT_COUNT, STATE_COUNT, STEPS, correction_of, shift_of
 from acu_daemon.model import Site
 from acu_daemon.orbit.frames import enu_from_itrs, itrs_from_teme, station_itrs_m
 from acu_daemon.orbit.propagator import Propagator

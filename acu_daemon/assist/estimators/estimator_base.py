@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from acu_daemon.assist.gate import ReadingGate, Rejected
+from acu_daemon.assist.reading_gate import ReadingGate, Rejected
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import Correction, FitResult, Readings, Site, sky_angle_deg
 from acu_daemon.orbit.frames import station_itrs_m, teme_from_itrs

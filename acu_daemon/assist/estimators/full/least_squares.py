@@ -8,8 +8,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from acu_daemon.assist.full_path import node_times, orbit_partials_itrs, path_itrs, site_of, sky_partials
-from acu_daemon.assist.full_points import (
+from acu_daemon.assist.estimators.full.estimated_states import STATION, Prior
+from acu_daemon.assist.estimators.full.normal_points import (
     Points,
     Residuals,
     Sights,
@@ -17,7 +17,13 @@ from acu_daemon.assist.full_points import (
     residuals,
     seconds_of,
 )
-from acu_daemon.assist.full_states import STATION, Prior
+from acu_daemon.assist.estimators.full.path_partials import (
+    node_times,
+    orbit_partials_itrs,
+    path_itrs,
+    site_of,
+    sky_partials,
+)
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import Site
 from acu_daemon.orbit.propagator import Propagator

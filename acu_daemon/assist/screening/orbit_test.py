@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from acu_daemon.assist.full import FullEstimator
-from acu_daemon.assist.full_states import make_prior, states_of
-from acu_daemon.assist.offsets import Offsets, offsets
+from acu_daemon.assist.estimators.full.estimated_states import make_prior, states_of
+from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
+from acu_daemon.assist.screening.offsets import Offsets, offsets
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings, StateSigmas
 from acu_daemon.errors import OrbitError
 from acu_daemon.model import Readings, Site

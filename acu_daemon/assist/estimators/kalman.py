@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from acu_daemon.assist.base import BaseEstimator, mean_motion_rad_s
-from acu_daemon.assist.gate import OUTLIER
+from acu_daemon.assist.estimators.estimator_base import BaseEstimator, mean_motion_rad_s
+from acu_daemon.assist.reading_gate import OUTLIER
 from acu_daemon.assist.settings import EstimatorSettings, KalmanTuning
 from acu_daemon.model import Correction, Readings, Site
 from acu_daemon.orbit.frames import enu_from_itrs, itrs_from_teme, station_itrs_m

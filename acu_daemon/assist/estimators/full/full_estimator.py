@@ -4,15 +4,15 @@ from dataclasses import fields
 
 import numpy as np
 
-from acu_daemon.assist.base import BaseEstimator
-from acu_daemon.assist.carry_over import CarryOver, aged_prior
-from acu_daemon.assist.full_points import Sights, sights
-from acu_daemon.assist.full_solve import Problem, Solution, solve
-from acu_daemon.assist.full_states import Prior, bias_of, correction_of, make_prior, shift_of
-from acu_daemon.assist.innovation import DENIED_S, WIDEST_SIGMAS, Denial
+from acu_daemon.assist.estimators.estimator_base import BaseEstimator
+from acu_daemon.assist.estimators.full.carry_over import CarryOver, aged_prior
+from acu_daemon.assist.estimators.full.carry_over_test import DENIED_S, WIDEST_SIGMAS, Denial
+from acu_daemon.assist.estimators.full.elements_discrepancy import why_far
+from acu_daemon.assist.estimators.full.estimated_states import Prior, bias_of, correction_of, make_prior, shift_of
+from acu_daemon.assist.estimators.full.least_squares import Problem, Solution, solve
+from acu_daemon.assist.estimators.full.normal_points import Sights, sights
+from acu_daemon.assist.estimators.full.prior_inflation import WIDTHS, is_strained, most_likely
 from acu_daemon.assist.settings import EstimatorSettings
-from acu_daemon.assist.why_far import why_far
-from acu_daemon.assist.widening import WIDTHS, is_strained, most_likely
 from acu_daemon.model import Correction, FitResult, Readings, Site
 from acu_daemon.orbit.frames import station_itrs_m, teme_from_itrs
 from acu_daemon.orbit.propagator import Propagator
@@ -23,7 +23,7 @@ _RETRY_SHARE = 1.3  # so many more readings until another widening is tried
 
 
 class FullEstimator(BaseEstimator):
-    """Weighted least squares of all readings with a prior, behind the `Estimator` protocol (reference: full_solve)."""
+    """Weighted least squares of all readings with a prior, behind the `Estimator` protocol (full.least_squares)."""
 
     name = "full"
 
@@ -50,7 +50,7 @@ class FullEstimator(BaseEstimator):
         self._is_new = False
         self._fit: FitResult | None = None  # to all readings so far
         self._may_widen = may_widen
-        self._width = 0  # of widening.WIDTHS
+        self._width = 0  # of prior_inflation.WIDTHS
         self._next_try_count = 0
 
     def add(self, readings: Readings) -> None:

@@ -14,14 +14,14 @@ from functools import partial
 
 import numpy as np
 
-from acu_daemon.assist.calm import is_calm
-from acu_daemon.assist.gate import ACCELERATION, BELIED, OFF_PATH, WRONG_TARGET, ReadingGate
-from acu_daemon.assist.judge import Judge
-from acu_daemon.assist.offsets import Offsets, offsets
+from acu_daemon.assist.reading_gate import ACCELERATION, BELIED, OFF_PATH, WRONG_TARGET, ReadingGate
+from acu_daemon.assist.reading_spans import seconds, span_s, tail_of
+from acu_daemon.assist.screening.correlated_offsets import Wander
+from acu_daemon.assist.screening.off_path_reason import LOW_DB, is_weak_beside, left_path_tai_s, reason_of, rise_db
+from acu_daemon.assist.screening.offsets import Offsets, offsets
+from acu_daemon.assist.screening.orbit_test import Judge
+from acu_daemon.assist.screening.path_acceleration import is_calm
 from acu_daemon.assist.settings import EstimatorSettings
-from acu_daemon.assist.spans import seconds, span_s, tail_of
-from acu_daemon.assist.strangers import LOW_DB, is_weak_beside, left_path_tai_s, reason_of, rise_db
-from acu_daemon.assist.wander import Wander
 from acu_daemon.model import FitResult, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
 

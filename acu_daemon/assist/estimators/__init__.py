@@ -1,0 +1,1 @@
+"""The estimators: the three of the papers, and `full`.  Pure."""

@@ -1,0 +1,1 @@
+"""Screening of readings by the orbit: side lobe, wrong target, accelerating axis.  Pure."""

@@ -1,0 +1,1 @@
+"""The estimation session of a pass: refit, choice of the model, prediction buffer.  Pure."""
