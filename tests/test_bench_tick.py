@@ -93,6 +93,7 @@ def test_a_few_seconds_of_a_locked_daemon_are_measured(tmp_path: Path, name: str
     assert (ticks.status_count > 0) == (name == "polled")
     assert 0.0 <= ticks.limit_p50_ms <= ticks.limit_p99_ms <= ticks.limit_max_ms
     assert ticks.memory_mb > 0.0
-    starts = [json.loads(log.read_text().splitlines()[0]) for log in tmp_path.glob("*/daemon.jsonl")]
+    lines = [json.loads(line) for log in tmp_path.glob("*/daemon.jsonl") for line in log.read_text().splitlines()]
+    starts = [line for line in lines if line["event"] == "run.start"]
     expected = "SCHED_FIFO 30" if name == "fifo" and ticks.is_permitted else "SCHED_OTHER"
-    assert [(start["event"], start["scheduling"]) for start in starts] == antennas * [("run.start", expected)]
+    assert [start["scheduling"] for start in starts] == antennas * [expected]

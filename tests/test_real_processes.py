@@ -143,7 +143,7 @@ def test_a_terminal_shows_readable_lines_and_a_live_line_and_control_c_stops_saf
     rig.start_acu()
     with on_a_terminal([*rig.arguments("run"), "--state", str(tmp_path / "state")]) as (master, process):
         shown = read_terminal(master, until="state=AUTOTRACK/FITTED")
-        shown += read_terminal(master, until="AUTOTRACK/FITTED az")
+        shown += read_terminal(master, until="ON path")
         os.write(master, b"\x03")
         shown += read_terminal(master, until="\0")
         assert process.wait(PATIENCE_S) == 0
@@ -151,7 +151,7 @@ def test_a_terminal_shows_readable_lines_and_a_live_line_and_control_c_stops_saf
     assert "\r\x1b[K" in shown
     lines = [line for line in re.split(r"[\r\n]+", ANSI.sub("", shown)) if line.strip("^C ")]
     assert [line for line in lines if "REHEARSAL" not in line] == []
-    drawn = [line for line in lines if "AUTOTRACK/FITTED az" in line]
+    drawn = [line for line in lines if line.startswith("TRACKING") and "ON path" in line]
     assert drawn
     assert max(len(line.removesuffix("^C")) for line in drawn) < 80  # the live line keeps to the terminal
     assert any("run.done" in line and "reason=SIGINT" in line for line in lines)
