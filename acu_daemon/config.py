@@ -15,7 +15,8 @@ from pydantic import ValidationError
 from acu_daemon.assist.estimators.estimator import EstimatorSettings
 from acu_daemon.assist.settings import StateSigmas
 from acu_daemon.config_problems import in_words
-from acu_daemon.config_tables import SatelliteFile, Section, StationFile, UncertaintySection
+from acu_daemon.config_section import Section
+from acu_daemon.config_tables import SatelliteFile, StationFile, UncertaintySection
 from acu_daemon.control.axis_watch import Bounds
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.errors import ConfigError

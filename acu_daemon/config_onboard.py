@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from acu_daemon.config import parse, read_toml
+from acu_daemon.config_section import Section
 from acu_daemon.config_tables import (
     BrouwerSection,
     ElementsFileSection,
@@ -18,7 +19,6 @@ from acu_daemon.config_tables import (
     Positive,
     SatelliteFile,
     SatelliteSection,
-    Section,
     TimeSection,
     UtcTime,
 )

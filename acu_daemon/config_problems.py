@@ -51,7 +51,7 @@ def in_words(item: Mapping[str, Any], under: str = "", known: Keys = _NO_KEYS) -
         return f"{key}.kind = {_shown(context['tag'])}: expected one of {', '.join(KINDS)}"
     if kind == "value_error":
         reason = item["msg"].removeprefix("Value error, ").removeprefix(f"{value!r}: ")
-        return f"{key}.{reason}" if isinstance(value, dict) else f"{key}{_assigned(value)}: {reason}"
+        return f"{key}.{reason}".lstrip(".") if isinstance(value, dict) else f"{key}{_assigned(value)}: {reason}"
     reason = f"expected {_EXPECTED[kind].format(**context)}" if kind in _EXPECTED else item["msg"]
     return f"{key}{_assigned(value)}: {reason}"
 

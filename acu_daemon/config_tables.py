@@ -3,8 +3,10 @@
 from datetime import UTC, datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
+from acu_daemon.config_antenna import AtmosphereSection, MountSection
+from acu_daemon.config_section import Section
 from acu_daemon.edge.link import make_link
 from acu_daemon.errors import UsageError
 from acu_daemon.model import AxisLimits, EarthOrientation, Site, Station
@@ -29,17 +31,6 @@ def _tai(value: object) -> float:
 UtcTime = Annotated[float, BeforeValidator(_tai)]
 Positive = Annotated[float, Field(gt=0)]
 Name = Annotated[str, Field(min_length=1)]
-
-
-class Section(BaseModel):
-    """A table of a TOML file: no unknown keys, no infinite numbers, no text where a number belongs."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
-
-    def _must_be_below(self, lower: str, upper: str) -> None:
-        low, high = getattr(self, lower), getattr(self, upper)
-        if low >= high:
-            raise ValueError(f"{lower} = {low:g}: expected less than {upper} = {high:g}")
 
 
 class StationSection(Section):
@@ -104,6 +95,16 @@ class TimeSection(Section):
     ut1_utc_s: float = Field(default=0.0, ge=-1, le=1)
     polar_motion_x_arcsec: float = Field(default=0.0, ge=-2, le=2)
     polar_motion_y_arcsec: float = Field(default=0.0, ge=-2, le=2)
+    earth_orientation: Name | None = None  # a finals2000A or C04 file, in place of the three numbers
+
+    @model_validator(mode="after")
+    def _numbers_or_a_file(self) -> "TimeSection":
+        if self.earth_orientation is not None and (typed := sorted(self.model_fields_set - {"earth_orientation"})):
+            raise ValueError(
+                f"earth_orientation = {self.earth_orientation!r} and {', '.join(typed)}: expected the file or the "
+                "numbers, not both; leave the numbers out"
+            )
+        return self
 
     @property
     def orientation(self) -> EarthOrientation:
@@ -162,6 +163,13 @@ class StationFile(Section):
     readings: ReadingsSection = ReadingsSection()
     tracking: TrackingSection = TrackingSection()
     safety: SafetySection = SafetySection()
+    atmosphere: AtmosphereSection = AtmosphereSection()
+    mount: MountSection = MountSection()
+
+    @model_validator(mode="after")
+    def _is_some_air(self) -> "StationFile":
+        self.atmosphere.check(self.site.station)
+        return self
 
     @property
     def site(self) -> Site:
@@ -231,6 +239,6 @@ class SatelliteFile(Section):
     elements: Annotated[ElementsFileSection | BrouwerSection, Field(discriminator="kind")]
     uncertainty: UncertaintySection = UncertaintySection()
     fallback: FallbackSection = FallbackSection()
-    receiver: dict[str, Any] = {}
-    readings: dict[str, Any] = {}
-    tracking: dict[str, Any] = {}
+    receiver: dict[str, Any] = Field(default={})
+    readings: dict[str, Any] = Field(default={})
+    tracking: dict[str, Any] = Field(default={})

@@ -18,6 +18,7 @@ import typer
 
 from acu_daemon.cli.options import Target, coming_pass, load_target, whose_recording
 from acu_daemon.cli.run import make_job
+from acu_daemon.cli.simulated import station_air
 from acu_daemon.daemon.live import LiveLine
 from acu_daemon.daemon.port import AcuPort
 from acu_daemon.daemon.service import Outcome, Service
@@ -37,7 +38,7 @@ from acu_daemon.protocol.messages import AcuMode, Backup, SelectBackup, SelectMo
 from acu_daemon.protocol.sa3842 import DEFAULT_ADDRESS
 from acu_daemon.report.trace import Figures, measure, read_trace
 from acu_daemon.sim.build import make_sky
-from acu_daemon.sim.scenario import Loss, read_scenario
+from acu_daemon.sim.scenario import Loss, Scenario, read_scenario
 from acu_daemon.sim.sky import Sky
 
 SATELLITE = "demo-1"
@@ -92,7 +93,8 @@ async def _demo(config: Path, out: Path) -> Outcome:
     clock = SystemClock(start_tai_s, at_monotonic_s)
     target = load_target(config, SATELLITE, start_tai_s)
     scenario = read_scenario(config / "scenario.toml")
-    sky = make_sky(target.elements.propagator, target.station.site, scenario)
+    air = station_air(target.station)
+    sky = make_sky(target.elements.propagator, target.station.site, scenario, station_air=air, seed=SEED)
     _print_plan(target, sky, scenario.losses, start_tai_s)
     async with (
         _fake_acu(config, at_monotonic_s, out / "assisted.csv") as assisted_url,
@@ -101,7 +103,7 @@ async def _demo(config: Path, out: Path) -> Outcome:
     ):
         rival = group.create_task(_rate_memory(memory_url))
         try:
-            return await _assisted(config, assisted_url, clock, sky, out / "readings.csv")
+            return await _assisted(config, assisted_url, clock, (scenario, sky), out)
         finally:
             rival.cancel()
 
@@ -148,7 +150,7 @@ async def _fake_acu(config: Path, at_monotonic_s: float, trace: Path) -> AsyncIt
         await process.wait()
 
 
-async def _assisted(config: Path, url: str, clock: SystemClock, sky: Sky, recording_path: Path) -> Outcome:
+async def _assisted(config: Path, url: str, clock: SystemClock, scene: tuple[Scenario, Sky], out: Path) -> Outcome:
     target = load_target(config, SATELLITE, clock.tai_s())
     station = target.station
     target = replace(target, station=station.model_copy(update={"acu": station.acu.model_copy(update={"url": url})}))
@@ -167,9 +169,9 @@ async def _assisted(config: Path, url: str, clock: SystemClock, sky: Sky, record
 
     def show(seen: Snapshot) -> None:
         if live is not None:
-            live.show(seen, beam_error_deg=_beam_error_deg(seen, sky))
+            live.show(seen, beam_error_deg=_beam_error_deg(seen, *scene))
 
-    with RecordingWriter(recording_path, whose=whose_recording(target, is_rehearsal=True)) as recording:
+    with RecordingWriter(out / "readings.csv", whose=whose_recording(target, is_rehearsal=True)) as recording:
         service = Service(job, link, clock, ProcessFitRunner(job.refit), on_snapshot=show, on_reading=recording.add)
         take_signals(asyncio.get_running_loop(), service.stop, tell_signal)
         try:
@@ -180,12 +182,15 @@ async def _assisted(config: Path, url: str, clock: SystemClock, sky: Sky, record
             clock.close()
 
 
-def _beam_error_deg(seen: Snapshot, sky: Sky) -> float | None:
-    """Angle between encoder and satellite: the demo knows its own sky."""
+def _beam_error_deg(seen: Snapshot, scenario: Scenario, sky: Sky) -> float | None:
+    """Angle between beam and satellite: the demo knows its own pedestal and sky."""
     if seen.az_deg is None or seen.el_deg is None or seen.reading_age_s is None:
         return None
-    truth = sky.direction(seen.tai_s - seen.reading_age_s)
-    return None if truth is None else sky_angle_deg(seen.az_deg, seen.el_deg, truth[0], truth[1])
+    tai_s = seen.tai_s - seen.reading_age_s
+    zero_az_deg, zero_el_deg = scenario.encoder_zero_deg(tai_s)
+    beam_deg = scenario.mount.beam_deg(seen.az_deg - zero_az_deg, seen.el_deg - zero_el_deg)
+    truth = sky.direction(tai_s)
+    return None if truth is None else sky_angle_deg(*beam_deg, truth[0], truth[1])
 
 
 async def _rate_memory(url: str) -> None:

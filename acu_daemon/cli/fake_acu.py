@@ -9,6 +9,7 @@ import typer
 from acu_daemon.cli.options import At, AtMonotonic, Config, Satellite, load_target, nearest_to_pass
 from acu_daemon.cli.rehearsal import clock_text, meet_in_rehearsal
 from acu_daemon.cli.serving import Control, Place, parse_place, serve_until_stopped
+from acu_daemon.cli.simulated import station_air
 from acu_daemon.config import load_station
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.link import BITS_PER_CHARACTER, DEFAULT_BAUD, make_link
@@ -66,14 +67,20 @@ def command(
     Faults: [[fault]] tables of the scenario (verb, start_s, duration_s, count, probability, value, axis, on, seed), or
     live, one line in, one line out:  echo 'fault no-reply count=3' | nc 127.0.0.1 3900;  `help` lists all verbs.
 
+    There is air over the antenna where the scenario has [air] or the station [atmosphere] refraction = true, never with
+    refraction = false; a truth CSV stays geometric.  The trace has beam and satellite where they are in that air.
+
     Prints `listening tcp://HOST:PORT` (or the link of the pseudo terminal) when it is ready; ends on SIGTERM or Ctrl-C.
     Run the daemon beside it with the same --at: whichever starts first, on one machine both share its clock, and either
     can be ended and started again in mid-rehearsal.
 
-    A scenario holds [sky] along_track_s, delta_raan_deg; [encoder] azimuth_bias_deg, elevation_bias_deg, noise_deg;
-    [receiver] peak_agc_db, agc_noise_db, tracking_noise_deg; [acu] has_tilt, reply_latency_s, mode, azimuth_deg,
-    elevation_deg, sector_bit ("driven", "undriven", "random", "stuck-0", "stuck-1"); and any number of [[loss]] with
-    cause ("receiver", "silence-zone", "fade"), and start_s, duration_s or from_utc, to_utc; and [[fault]], as above.
+    A scenario holds [sky] along_track_s, delta_raan_deg, light_time; [air] pressure_hpa, temperature_c,
+    humidity_percent, refractivity_factor, refractivity_drawn_within, profile ("quartic", "exponential"); [mount]
+    ia_deg, ie_deg, ca_deg, npae_deg, an_deg, aw_deg, tf_deg (docs/antenna-model.md); [drift] azimuth_deg,
+    elevation_deg, peak_utc_h; [encoder] azimuth_bias_deg, elevation_bias_deg, noise_deg; [receiver] peak_agc_db,
+    agc_noise_db, tracking_noise_deg; [acu] has_tilt, reply_latency_s, mode, azimuth_deg, elevation_deg, sector_bit
+    ("driven", "undriven", "random", "stuck-0", "stuck-1"); and any number of [[loss]] with cause ("receiver",
+    "silence-zone", "fade"), and start_s, duration_s or from_utc, to_utc; and [[fault]], as above.
     """
     if listen is not None and pty is not None:
         raise UsageError("--listen and --pty exclude each other")
@@ -91,6 +98,7 @@ def command(
         start_tai_s=clock.tai_s(),
         scenario=scenario,
         truth=truth,
+        station_air=station_air(station),
         seed=seed,
         address=address_byte(station.acu.address),
     )

@@ -13,6 +13,7 @@ import structlog
 
 from acu_daemon.cli.options import Target, coming_pass
 from acu_daemon.cli.run import make_job
+from acu_daemon.cli.simulated import station_air
 from acu_daemon.control.refit import RefitSetup
 from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.daemon.snapshot import Snapshot
@@ -22,11 +23,12 @@ from acu_daemon.protocol.messages import Command
 from acu_daemon.protocol.sa3842 import CommandDecoder, address_byte
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.acu_faults import break_acu
+from acu_daemon.sim.build import make_sky
 from acu_daemon.sim.fault_board import FaultBoard
 from acu_daemon.sim.memory import MemoryLink
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.scenario import Scenario
-from acu_daemon.sim.sky import Sky, read_truth
+from acu_daemon.sim.sky import Sky
 from acu_daemon.sim.trace import TraceRow
 from acu_daemon.sim.virtual import run_virtual
 from acu_daemon.sim.wire_log import RegisterWrite
@@ -98,11 +100,15 @@ def fly(
 ) -> Flight:
     """Run the daemon on a pass in virtual time.
 
-    sky: a Sky, or a truth CSV.  script: what happens to the ACU and the link, each at its TAI, such as a power cycle.
+    sky: as the antenna meets it (make_sky), or a truth CSV, which is geometric.  script: what happens to the ACU and
+    the link, each at its TAI, such as a power cycle.
     make_...: other parts than the usual ones, such as a clock that stalls.
     """
     flight = Flight()
-    truth = read_truth(sky) if isinstance(sky, Path) else sky
+    truth = sky
+    if isinstance(truth, Path):
+        elements, station = target.elements.propagator, target.station
+        truth = make_sky(elements, station.site, scenario, truth, station_air=station_air(station), seed=seed)
 
     async def main() -> None:
         clock = make_clock(begin_tai_s)

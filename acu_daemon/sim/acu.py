@@ -1,7 +1,7 @@
 """SIMULATION of the whole ACU with pedestal, receiver and sky, without IO (docs/protocol.md).
 
 Time is TAI seconds; the servo ticks at 50 Hz from start_tai_s on and is stepped lazily up to the time of each call.
-Angles are in the encoder frame, azimuth continuous; the beam points to encoder minus bias.
+Angles are in the encoder frame, azimuth continuous.
 """
 
 from collections.abc import Callable

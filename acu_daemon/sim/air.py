@@ -1,22 +1,26 @@
 """The simulator's own air: dry and wet parts that end at different heights, rays by Snell's law through thin shells.
 
-Not the product's: its profile is not exponential, its refractivity and vapour pressure are other formulas, its rays are
-marched through 700 shells of constant index, and nothing is imported from acu_daemon.pointing.
+Not the product's: its refractivity and vapour pressure are other formulas, its profile is another unless asked, its
+rays are marched through 700 shells of constant index, and nothing is imported from acu_daemon.pointing.
 
 Sources: Hopfield 1969, quartic profiles N_dry (1 - h / h_dry)^4 with h_dry = 40136 + 148.72 t (m, t in deg C), N_wet
-the same with 11 km; Smith and Weintraub 1953, N = 77.6 / T (P + 4810 e / T); Tetens 1930, saturated vapour.
+the same with 11 km; Smith and Weintraub 1953, N = 77.6 / T (P + 4810 e / T); Tetens 1930, saturated vapour; ITU-R
+P.453's exponential of 7.35 km as the other profile.
 """
 
 from dataclasses import dataclass
 from math import exp
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+Profile = Literal["quartic", "exponential"]
 
 _EARTH_M = 6371e3
 _WET_TOP_M = 11e3
+_SCALE_HEIGHT_M, _EXPONENTIAL_TOP_M = 7350.0, 150e3
 _APPARENT_DEG = np.concatenate([np.arange(0.0, 5.0, 0.05), np.arange(5.0, 20.0, 0.1), np.arange(20.0, 90.1, 0.5)])
 
 
@@ -46,17 +50,27 @@ class SimulatedAir:
 
 
 def simulated_air(
-    pressure_hpa: float, temperature_c: float, humidity_percent: float, height_m: float = 0.0, denser: float = 1.0
+    pressure_hpa: float,
+    temperature_c: float,
+    humidity_percent: float,
+    height_m: float = 0.0,
+    denser: float = 1.0,
+    profile: Profile = "quartic",
 ) -> SimulatedAir:
     """March the rays through the air of a weather at an antenna; denser multiplies the refractivity.  10 ms."""
     kelvin = temperature_c + 273.16
     vapour_hpa = humidity_percent / 100.0 * 6.1078 * exp(17.27 * temperature_c / (temperature_c + 237.3))
     dry, wet = 77.6 * pressure_hpa / kelvin, 77.6 * 4810.0 * vapour_hpa / kelvin**2
     dry_top_m = 40136.0 + 148.72 * temperature_c
-    edges_m = dry_top_m * np.linspace(0.0, 1.0, 701) ** 2  # 0.1 m at the ground, 120 m at the top
+    top_m = dry_top_m if profile == "quartic" else _EXPONENTIAL_TOP_M
+    edges_m = top_m * np.linspace(0.0, 1.0, 701) ** 2  # 0.1 m at the ground, 120 m at the top
     middles_m = (edges_m[1:] + edges_m[:-1]) / 2.0
-    wet_left = np.maximum(1.0 - middles_m / _WET_TOP_M, 0.0)
-    indices = 1.0 + 1e-6 * denser * (dry * (1.0 - middles_m / dry_top_m) ** 4 + wet * wet_left**4)
+    if profile == "quartic":
+        wet_left = np.maximum(1.0 - middles_m / _WET_TOP_M, 0.0)
+        refractivity = dry * (1.0 - middles_m / dry_top_m) ** 4 + wet * wet_left**4
+    else:
+        refractivity = (dry + wet) * np.exp(-middles_m / _SCALE_HEIGHT_M)
+    indices = 1.0 + 1e-6 * denser * refractivity
     radii_m = _EARTH_M + height_m + edges_m
     invariant = indices[0] * radii_m[0] * np.cos(np.radians(_APPARENT_DEG))
     central = np.zeros_like(invariant)

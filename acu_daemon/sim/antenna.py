@@ -1,7 +1,8 @@
 """SIMULATION of everything that moves and hears: axes, encoders, autotrack loop, receiver, under the sky.
 
-Angles of the axes are those of the encoder, azimuth continuous; the beam points to encoder minus bias.  The
-tilt axis moves, but does not turn the beam.
+Angles of the axes are those of the encoder, azimuth continuous; the beam points where a pedestal with the scenario's
+faults has it then (mount_axes.py), and the satellite is where it appears.  The tilt axis moves, but does not turn the
+beam.
 """
 
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from random import Random
 from acu_daemon.model import AxisLimits
 from acu_daemon.protocol.angles import elevation_code, elevation_deg
 from acu_daemon.sim.autotrack import Autotrack
+from acu_daemon.sim.mount_axes import MountAxes
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.pedestal import STEP_S, Axis, Follower
 from acu_daemon.sim.receiver import Offset, Receiver, ReceiverSettings, offset_in_beam
@@ -77,7 +79,9 @@ class Antenna:
         self.trouble = AntennaTrouble()
         self._heard: Offset | None = None
         self._sky = parts.sky
-        self._encoder = scenario.encoder
+        self._scenario = scenario
+        self._mount = None if scenario.mount == MountAxes() else scenario.mount
+        self._zero_deg = scenario.encoder_zero_deg(parts.start_tai_s)
         self._encoder_random = Random(f"{parts.seed} encoder")
         self._sector_bit = scenario.acu.sector_bit
         self._sector_random = Random(f"{parts.seed} sector")
@@ -103,18 +107,18 @@ class Antenna:
 
     @property
     def boresight_deg(self) -> tuple[float, float]:
-        """True azimuth (continuous) and elevation of the beam."""
-        encoder, trouble = self._encoder, self.trouble
-        az_deg = self.az.angle_deg - encoder.azimuth_bias_deg - trouble.slip_az_deg
-        el_deg = self.el.angle_deg - encoder.elevation_bias_deg - trouble.slip_el_deg
-        if trouble.play_deg == (0.0, 0.0):
-            return az_deg, el_deg
-        return trouble.beam_deg(az_deg, el_deg)
+        """True azimuth (of any turn) and elevation of the beam, apparent: where what it hears appears."""
+        trouble = self.trouble
+        az_deg = self.az.angle_deg - self._zero_deg[0] - trouble.slip_az_deg
+        el_deg = self.el.angle_deg - self._zero_deg[1] - trouble.slip_el_deg
+        if trouble.play_deg != (0.0, 0.0):
+            az_deg, el_deg = trouble.beam_deg(az_deg, el_deg)
+        return (az_deg, el_deg) if self._mount is None else self._mount.beam_deg(az_deg, el_deg)
 
     def reading_deg(self, part_s: float) -> tuple[float, float]:
         """Azimuth (continuous) and elevation as the encoders show them, with noise, part_s after the last step."""
         az_deg, el_deg = self.az.angle_after_deg(part_s), self.el.angle_after_deg(part_s)
-        if noise_deg := self._encoder.noise_deg:
+        if noise_deg := self._scenario.encoder.noise_deg:
             gauss = self._encoder_random.gauss
             az_deg += gauss(0.0, noise_deg) / max(cos(radians(el_deg)), _LEAST_COS_EL)
             el_deg += gauss(0.0, noise_deg)
@@ -143,6 +147,7 @@ class Antenna:
         self.az.move()
         self.el.move()
         self.tilt.move()
+        self._zero_deg = self._scenario.encoder_zero_deg(tai_s)
         fade_db, is_silent, is_connected = 0.0, self.trouble.is_silent, True
         for start_s, end_s, loss in self._losses:
             if start_s <= tai_s < end_s:

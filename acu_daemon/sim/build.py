@@ -1,24 +1,52 @@
 """SIMULATION: puts a fake ACU together from what a command line and a configuration give."""
 
+from dataclasses import dataclass
 from math import radians
 from pathlib import Path
 
 from acu_daemon.model import AxisLimits, Correction, Site
 from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.pointing.air import Air
 from acu_daemon.protocol.sa3842 import DEFAULT_ADDRESS
 from acu_daemon.sim.acu import FakeAcu
+from acu_daemon.sim.apparent_sky import LOWEST_GEOMETRIC_EL_DEG, ApparentSky, make_air
 from acu_daemon.sim.parts import AcuParts
-from acu_daemon.sim.scenario import Scenario, read_scenario
+from acu_daemon.sim.scenario import AirChoice, Scenario, read_scenario
 from acu_daemon.sim.sky import DelayedPropagator, OrbitSky, Sky, read_truth
 
 
-def make_sky(propagator: Propagator, site: Site, scenario: Scenario, truth: Path | None = None) -> Sky:
-    """The sky from a truth CSV, else from the elements with the scenario's errors.  UsageError: the CSV is wrong."""
+@dataclass(frozen=True, slots=True)
+class StationAir:
+    """What a station's file says of the air over the antenna: the scenario may make it another, or ask for it."""
+
+    weather: Air
+    is_there: bool  # whether there is air where the scenario has no [air]
+
+
+def make_sky(
+    propagator: Propagator,
+    site: Site,
+    scenario: Scenario,
+    truth: Path | None = None,
+    *,
+    station_air: StationAir | None = None,
+    seed: int = 0,
+) -> Sky:
+    """The sky as the antenna meets it: from a truth CSV, else from the elements with the scenario's errors.
+
+    station_air: None is a vacuum, whatever the scenario says.  UsageError: the CSV is wrong.
+    """
+    errors, air = scenario.sky, None
+    if station_air is not None and (station_air.is_there or scenario.air is not None):
+        air = make_air(station_air.weather, scenario.air or AirChoice(), site.station.height_m, seed)
+    lowest_el_deg = 0.0 if air is None else LOWEST_GEOMETRIC_EL_DEG
+    geometric: Sky
     if truth is not None:
-        return read_truth(truth)
-    errors = scenario.sky
-    turned = propagator.corrected(Correction(delta_raan_rad=radians(errors.delta_raan_deg)))
-    return OrbitSky(DelayedPropagator(turned, errors.along_track_s), site)
+        geometric = read_truth(truth, lowest_el_deg)
+    else:
+        turned = propagator.corrected(Correction(delta_raan_rad=radians(errors.delta_raan_deg)))
+        geometric = OrbitSky(DelayedPropagator(turned, errors.along_track_s), site, lowest_el_deg)
+    return geometric if air is None and not errors.light_time else ApparentSky(geometric, air, errors.light_time)
 
 
 def build_fake_acu(
@@ -31,10 +59,11 @@ def build_fake_acu(
     start_tai_s: float,
     scenario: Path | None = None,
     truth: Path | None = None,
+    station_air: StationAir | None = None,
     seed: int = 0,
     address: int = DEFAULT_ADDRESS,
 ) -> FakeAcu:
     """Build a fake ACU.  UsageError: the scenario or the truth file cannot be used."""
     chosen = Scenario() if scenario is None else read_scenario(scenario)
-    sky = make_sky(propagator, site, chosen, truth)
+    sky = make_sky(propagator, site, chosen, truth, station_air=station_air, seed=seed)
     return FakeAcu(AcuParts(azimuth, elevation, beamwidth_deg, sky, start_tai_s, chosen, seed, address))

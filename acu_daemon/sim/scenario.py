@@ -1,6 +1,10 @@
 """SIMULATION: what a rehearsal is made of, read from a scenario TOML.
 
 [sky]        along_track_s, delta_raan_deg      the satellite's orbit against the elements: late (+), node east (+)
+             light_time                         whether the signal arrives range / c late
+[air]        pressure_hpa, temperature_c, humidity_percent, refractivity_factor, refractivity_drawn_within, profile
+[mount]      ia_deg, ie_deg, ca_deg, npae_deg, an_deg, aw_deg, tf_deg (docs/antenna-model.md)
+[drift]      azimuth_deg, elevation_deg, peak_utc_h     of the encoders, from day to night
 [encoder]    azimuth_bias_deg, elevation_bias_deg, noise_deg
 [receiver]   peak_agc_db, agc_noise_db, tracking_noise_deg
 [acu]        has_tilt, reply_latency_s, mode, azimuth_deg, elevation_deg, sector_bit
@@ -10,11 +14,15 @@
 
 import tomllib
 from dataclasses import dataclass, replace
+from math import cos, pi
 from pathlib import Path
 from typing import Any, Literal
 
 from acu_daemon.errors import ConfigError
+from acu_daemon.orbit.timescales import unix_from_tai
+from acu_daemon.sim.air import Profile
 from acu_daemon.sim.fault_verbs import Fault, read_fault
+from acu_daemon.sim.mount_axes import MountAxes
 from acu_daemon.sim.toml_table import read_table
 
 Cause = Literal["receiver", "silence-zone", "fade"]
@@ -28,6 +36,39 @@ class SkyErrors:
 
     along_track_s: float = 0.0
     delta_raan_deg: float = 0.0
+    light_time: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class AirChoice:
+    """The air over the antenna: its weather, where left out the one that the station's file tells the daemon.
+
+    The refractivity is that of the weather by refractivity_factor, and by one drawn from 1 - refractivity_drawn_within
+    to 1 + refractivity_drawn_within, by the simulation's seed.
+    """
+
+    pressure_hpa: float | None = None
+    temperature_c: float | None = None
+    humidity_percent: float | None = None
+    refractivity_factor: float = 1.0
+    refractivity_drawn_within: float = 0.0
+    profile: Profile = "quartic"
+
+
+@dataclass(frozen=True, slots=True)
+class Drift:
+    """What the encoders read too much at peak_utc_h o'clock UTC, twelve hours later too little, as a cosine between."""
+
+    azimuth_deg: float = 0.0
+    elevation_deg: float = 0.0
+    peak_utc_h: float = 18.0
+
+    def at(self, tai_s: float) -> tuple[float, float]:
+        """Azimuth's and elevation's at an instant, degrees."""
+        if self.azimuth_deg == self.elevation_deg == 0.0:
+            return 0.0, 0.0
+        share = cos(2.0 * pi * (unix_from_tai(tai_s) / 3600.0 - self.peak_utc_h) / 24.0)
+        return share * self.azimuth_deg, share * self.elevation_deg
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,9 +140,25 @@ class Scenario:
     acu: AcuChoice = AcuChoice()
     losses: tuple[Loss, ...] = ()
     faults: tuple[Fault, ...] = ()
+    air: AirChoice | None = None  # None: where the station's file says so there is air all the same
+    mount: MountAxes = MountAxes()
+    drift: Drift = Drift()
+
+    def encoder_zero_deg(self, tai_s: float) -> tuple[float, float]:
+        """What the encoders read too much at an instant, beside what the mount makes of it: bias and drift."""
+        az_deg, el_deg = self.drift.at(tai_s)
+        return self.encoder.azimuth_bias_deg + az_deg, self.encoder.elevation_bias_deg + el_deg
 
 
-_SECTIONS = {"sky": SkyErrors, "encoder": Encoder, "receiver": ReceiverChoice, "acu": AcuChoice}
+_SECTIONS = {
+    "sky": SkyErrors,
+    "encoder": Encoder,
+    "receiver": ReceiverChoice,
+    "acu": AcuChoice,
+    "air": AirChoice,
+    "mount": MountAxes,
+    "drift": Drift,
+}
 _LISTS = ("loss", "fault")
 
 
@@ -127,12 +184,30 @@ def read_scenario(path: Path) -> Scenario:
     try:
         sections: dict[str, Any] = {}
         for name, section in _SECTIONS.items():
-            sections[name] = read_table(section, document.get(name, {}), name)
+            if name in document:
+                sections[name] = read_table(section, document[name], name)
+        if "air" in sections:
+            check_air(sections["air"])
         losses = tuple(_loss(table, i) for i, table in enumerate(lists["loss"], start=1))
         faults = tuple(read_fault(table, f"fault {i}") for i, table in enumerate(lists["fault"], start=1))
         return Scenario(**sections, losses=losses, faults=faults)
     except ValueError as error:
         raise ConfigError(f"{path}: {error}") from None
+
+
+def check_air(air: AirChoice) -> None:
+    """ValueError: says what no air has."""
+    ranges = {
+        "pressure_hpa": (200.0, 1100.0),
+        "temperature_c": (-80.0, 60.0),
+        "humidity_percent": (0.0, 100.0),
+        "refractivity_factor": (0.0, 1.5),
+        "refractivity_drawn_within": (0.0, 0.5),
+    }
+    for key, (least, most) in ranges.items():
+        value = getattr(air, key)
+        if value is not None and not least <= value <= most:
+            raise ValueError(f"[air] {key} = {value:g}: expected {least:g} to {most:g}")
 
 
 def _loss(table: object, number: int) -> Loss:

@@ -1,4 +1,4 @@
-"""SIMULATION of the sky: where the satellite really is, from a truth file or from an orbit of its own.
+"""SIMULATION of the sky: where the satellite really is, from a truth file or from an orbit of its own, in a vacuum.
 
 Directions are geometric and true; between the nodes they are cubics through unit vectors, since a linear azimuth is
 wrong by 0.06 deg at the zenith.  Asked fifty times a second, so a question costs microseconds.
@@ -7,7 +7,7 @@ wrong by 0.06 deg at the zenith.  Asked fifty times a second, so a question cost
 import csv
 from bisect import bisect_right
 from dataclasses import dataclass
-from math import asin, atan2, degrees
+from math import asin, atan2, degrees, radians, sin
 from pathlib import Path
 from typing import Protocol
 
@@ -28,16 +28,20 @@ _BLOCK_STEP_S = 1.0
 
 
 class Sky(Protocol):
-    """Where the satellite is."""
+    """Where the satellite is: what an antenna is given is where it appears (apparent_sky.py)."""
 
     def direction(self, tai_s: float) -> Direction | None:
         """True direction and range; None where the satellite is unknown or below the horizon."""
 
 
 class DirectionTable:
-    """Cubics through four directions each: azimuth, elevation (N,) in degrees, range (N,) in metres, times rising."""
+    """Cubics through four directions each: azimuth, elevation (N,) in degrees, range (N,) in metres, times rising.
 
-    def __init__(self, tai_s: Array, az_deg: Array, el_deg: Array, range_m: Array) -> None:
+    lowest_el_deg: where the sky ends; below the horizon for one that air lifts.
+    """
+
+    def __init__(self, tai_s: Array, az_deg: Array, el_deg: Array, range_m: Array, lowest_el_deg: float = 0.0) -> None:
+        self._least_up = sin(radians(lowest_el_deg))
         self.start_tai_s, self.end_tai_s = float(tai_s[0]), float(tai_s[-1])
         times = tai_s - tai_s[0]
         flat = np.cos(el_deg * DEG)
@@ -55,7 +59,7 @@ class DirectionTable:
         self._last = 0
 
     def direction(self, tai_s: float) -> Direction | None:
-        """Interpolate; None outside the span or below the horizon."""
+        """Interpolate; None outside the span or below the lowest elevation."""
         t = tai_s - self.start_tai_s
         times = self._times
         if not 0.0 <= t <= times[-1]:
@@ -66,13 +70,13 @@ class DirectionTable:
         t0, t1, t2, _ = self._nodes[i]
         u, v, w = t - t0, t - t1, t - t2
         east, north, up, range_m = (a + u * (b + v * (c + w * d)) for a, b, c, d in self._cubics[i])
-        if up < 0.0:
+        if up < self._least_up:
             return None
         return degrees(atan2(east, north)) % 360.0, degrees(asin(min(up, 1.0))), range_m
 
 
-def read_truth(path: Path) -> DirectionTable:
-    """Read a truth CSV (TRUTH_HEADER).  UsageError: names file and line."""
+def read_truth(path: Path, lowest_el_deg: float = 0.0) -> DirectionTable:
+    """Read a truth CSV (TRUTH_HEADER), whose directions are geometric.  UsageError: names file and line."""
     rows: list[tuple[float, float, float, float]] = []
     try:
         file = path.open(newline="", encoding="utf-8", errors="replace")
@@ -95,7 +99,8 @@ def read_truth(path: Path) -> DirectionTable:
             rows.append(row)
     if len(rows) < _NODES:
         raise UsageError(f"{path}: {len(rows)} lines of data, at least {_NODES} are needed for a cubic")
-    return DirectionTable(*np.array(rows).T)
+    tai_s, az_deg, el_deg, range_m = np.array(rows).T
+    return DirectionTable(tai_s, az_deg, el_deg, range_m, lowest_el_deg)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,13 +132,14 @@ class DelayedPropagator:
 class OrbitSky:
     """A sky from a propagator, computed a block at a time."""
 
-    def __init__(self, propagator: Propagator, site: Site) -> None:
+    def __init__(self, propagator: Propagator, site: Site, lowest_el_deg: float = 0.0) -> None:
         self._propagator = propagator
+        self._lowest_el_deg = lowest_el_deg
         self._site = site
         self._block: DirectionTable | None = None
 
     def direction(self, tai_s: float) -> Direction | None:
-        """Interpolate; None below the horizon or outside the propagator's spans.
+        """Interpolate; None below the lowest elevation or outside the propagator's spans.
 
         Raises:  OrbitError: the propagator has no answer.
         """
@@ -152,4 +158,4 @@ class OrbitSky:
         count = max(_NODES, 1 + round((end_tai_s - start_tai_s) / _BLOCK_STEP_S))
         times = np.linspace(start_tai_s, end_tai_s, count)
         look = look_at(self._propagator, times, self._site)
-        return DirectionTable(times, look.az_deg, look.el_deg, look.range_m)
+        return DirectionTable(times, look.az_deg, look.el_deg, look.range_m, self._lowest_el_deg)
