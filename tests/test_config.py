@@ -172,7 +172,7 @@ STATION_MISTAKES = [
         "mount.ca_deg, npae_deg, an_deg and aw_deg are 0.4 in sum: expected at most 0.3",
     ),
     ("[station]", "[mount]\nia_sigma_deg = -1\n[station]", "mount.ia_sigma_deg = -1: expected at least 0"),
-    ("[station]", "[mount]\nia = 0.1\n[station]", "mount.ia = 0.1: unknown key; did you mean ia_deg?"),
+    ("[station]", "[mount]\nia_degs = 0.1\n[station]", "mount.ia_degs = 0.1: unknown key; did you mean ia_deg?"),
     ("[station]", "[receiver]\nbeamwidth_deg = 0\n[station]", "receiver.beamwidth_deg = 0: expected more than 0"),
     ("[station]", "[station", "not TOML: Expected ']' at the end of a table declaration (at line 2, column 9)"),
     (LATITUDE, f"latitude_deg = {'9' * 5000}", "not TOML: Exceeds the limit"),
