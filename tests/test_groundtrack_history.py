@@ -1,5 +1,6 @@
 """D and manoeuvres from element sets: made ones, whose truth is known; and files that nothing can be seen in."""
 
+import gzip
 import json
 from dataclasses import replace
 from functools import lru_cache
@@ -26,6 +27,7 @@ DAYS = 90
 MANOEUVRES = Steering(np.array([11.8, 43.1, 70.2]) * DAY_S, np.array([168.0, 190.0, 196.0]))  # keep it in +-4 km
 NOISELESS_M, NOISY_M = 10.0, 130.0  # of D, rms
 SIZE_SHARE = 0.03
+KEPT_M = 8_000.0  # the widest band of such missions, Landsat's
 
 
 @lru_cache
@@ -130,6 +132,10 @@ def test_a_gap_is_told_and_nothing_is_invented_in_it(tmp_path: Path) -> None:
         (lambda sets: sets, ("--norad-id", 5), "no element set of 5; it holds 90001"),
         (lambda sets: sets, ("--cycle", "143/10"), "it is not its cycle"),
         (lambda sets: sets, ("--cycle", "143"), "expected REVOLUTIONS/DAYS"),
+        (lambda sets: sets, ("--cycle", 2 * "9999999999" + "/16"), "expected REVOLUTIONS/DAYS"),
+        (lambda sets: sets, ("--cycle", "99999/1"), "below the ground"),
+        (lambda sets: sets, ("--plot", "d.foo"), "expected a name that ends in .png"),
+        (lambda sets: [replace(one, inclination_rad=0.0) for one in sets], (), "does not cross the equator"),
         (lambda sets: sets, ("--csv", "/nowhere/d.csv"), "there is no directory"),
         (
             lambda sets: [
@@ -166,6 +172,37 @@ def test_sets_a_whole_cycle_apart_are_not_taken_for_a_shorter_cycle(tmp_path: Pa
     assert done.code == 0, done.err
     assert json.loads(done.out)["cycle_revolutions"] == 373
     assert "nothing is known from" in done.err
+
+
+def test_a_set_of_another_orbit_under_the_same_number_is_left_out_with_a_word(tmp_path: Path) -> None:
+    sets = made()
+    sets = [*sets[:30], replace(sets[30], mean_motion_rad_s=1.02 * sets[30].mean_motion_rad_s), *sets[31:]]
+    path = tmp_path / "made.json"
+    path.write_text(omm_text(sets))
+    done = acu_daemon("groundtrack", "from-elements", path, "--json")
+    assert "record 31: left out: of quite another orbit" in done.err
+    found = json.loads(done.out)
+    assert len(found["d"]) == DAYS - 1
+    assert len(found["manoeuvres"]) == 3
+
+
+@needs_data
+@pytest.mark.parametrize(("norad_id", "cycle"), [(39084, (233, 16)), (40697, (143, 10)), (41335, (385, 27))])
+def test_over_gaps_of_years_a_real_satellite_is_where_its_mission_keeps_it(
+    tmp_path: Path, norad_id: int, cycle: tuple[int, int]
+) -> None:
+    folder = DATA / "tle_sets"
+    files = [folder / f"celestrak_resource_{day}.txt" for day in ("2018-11-07", "2026-05-30")]
+    texts = [one.read_text() for one in files]
+    texts += [gzip.decompress(one.read_bytes()).decode() for one in folder.glob("*.gz")]
+    path = tmp_path / "history.tle"
+    path.write_text("\n".join(texts))
+    done = acu_daemon("groundtrack", "from-elements", path, "--norad-id", norad_id, "--json")
+    assert done.code == 0, done.err
+    assert done.err.count("nothing is known from") == 2
+    found = json.loads(done.out)
+    assert (found["cycle_revolutions"], found["cycle_days"]) == cycle
+    assert found["d_max_m"] - found["d_min_m"] < KEPT_M
 
 
 @needs_data

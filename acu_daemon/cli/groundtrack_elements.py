@@ -1,15 +1,16 @@
 """`acu-daemon groundtrack from-elements`: D and the manoeuvres of a real satellite, from a history of element sets."""
 
 import json
+import re
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
 
-from acu_daemon.cli.outputs import refuse_unwritable
+from acu_daemon.cli.outputs import refuse_no_picture, refuse_unwritable
 from acu_daemon.errors import OrbitError, UsageError
-from acu_daemon.groundtrack.history import History, crossing_near, history_of, mean_orbit_of
+from acu_daemon.groundtrack.history import History, crossing_near, history_of, is_of_another_orbit, mean_orbit_of
 from acu_daemon.groundtrack.kinks import FoundManoeuvre, find_manoeuvres
 from acu_daemon.groundtrack.reference import Cycle
 from acu_daemon.orbit.element_set import ElementSet
@@ -19,6 +20,7 @@ from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.orbit.tle import parse_tle
 
 _SHOWN_PROBLEMS = 5
+_CYCLE = re.compile(r"([1-9][0-9]{0,4})/([1-9][0-9]{0,2})")
 
 CycleText = Annotated[
     str | None,
@@ -48,8 +50,9 @@ def command(
     D is where the satellite crosses the equator northwards less where it does on average, metres, east positive.  Noise
     of real element sets is about 100 m in D: a band of +-4 km shows clearly, one of +-100 m does not.
     """
-    refuse_unwritable(csv, plot)
-    sets = _one_satellite(_read(file), norad_id, file)
+    refuse_unwritable(csv)
+    refuse_no_picture(plot)
+    sets = _one_orbit(_one_satellite(_read(file), norad_id, file))
     crossings = []
     for one in sets:
         try:
@@ -77,10 +80,9 @@ def parsed_cycle(text: str | None) -> Cycle | None:
     """UsageError: not REVOLUTIONS/DAYS."""
     if text is None:
         return None
-    revolutions, _, days = text.partition("/")
-    if not (revolutions.isdecimal() and days.isdecimal() and int(days) > 0 and int(revolutions) > 0):
+    if (found := _CYCLE.fullmatch(text)) is None:
         raise UsageError(f"--cycle {text}: expected REVOLUTIONS/DAYS such as 373/26")
-    return Cycle(int(revolutions), int(days))
+    return Cycle(int(found[1]), int(found[2]))
 
 
 def write_csv(path: Path, header: str, rows: list[str]) -> None:
@@ -119,6 +121,18 @@ def _one_satellite(sets: list[ElementSet], norad_id: int | None, file: Path) -> 
         )
     by_epoch = {round(one.epoch_tai_s, 3): one for one in chosen}
     return [by_epoch[epoch] for epoch in sorted(by_epoch)]
+
+
+def _one_orbit(sets: list[ElementSet]) -> list[ElementSet]:
+    """The sets without those of quite another orbit, which are told: another satellite's, under the same number."""
+    means = [mean_orbit_of(one.mean_motion_rad_s, one.eccentricity, one.inclination_rad) for one in sets]
+    strangers = is_of_another_orbit(means)
+    out = [one for one, is_other in zip(sets, strangers, strict=True) if is_other]
+    for one in out[:_SHOWN_PROBLEMS]:
+        typer.echo(f"warning: {one.where}: left out: of quite another orbit than the other sets", err=True)
+    if len(out) > _SHOWN_PROBLEMS:
+        typer.echo(f"warning: {len(out) - _SHOWN_PROBLEMS} more element sets of another orbit are left out", err=True)
+    return [one for one, is_other in zip(sets, strangers, strict=True) if not is_other]
 
 
 def _as_object(last: ElementSet, history: History, found: list[FoundManoeuvre]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import typer
 from acu_daemon.assist.reading_gate import Dwell
 from acu_daemon.cli.groundtrack_elements import AsJson, Csv, CycleText, Plot, parsed_cycle, write_csv
 from acu_daemon.cli.options import Config, Satellite, load_target
-from acu_daemon.cli.outputs import refuse_unwritable
+from acu_daemon.cli.outputs import refuse_no_picture, refuse_unwritable
 from acu_daemon.config import estimator_settings
 from acu_daemon.control.ground_track import SeenPass, seen_pass
 from acu_daemon.control.refit import RefitSetup
@@ -64,7 +64,8 @@ def command(
     Every pass is fitted again, with the elements of its date, as `replay` does it; D is taken where that orbit crosses
     the equator, with the fit's own sigma.  D is in metres, east positive, less its median.
     """
-    refuse_unwritable(csv, plot)
+    refuse_unwritable(csv)
+    refuse_no_picture(plot)
     chosen_cycle, of_sun = parsed_cycle(cycle), _flux(flux)
     seen = _seen(directory, config, satellite)
     history, gaps = history_of([one.crossing for one in seen], [one.mean for one in seen], chosen_cycle)

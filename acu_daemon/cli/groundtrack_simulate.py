@@ -10,11 +10,11 @@ from typing import Annotated, Any
 
 import typer
 
-from acu_daemon.cli.outputs import refuse_unwritable
+from acu_daemon.cli.outputs import refuse_no_picture
 
 TRUE_DEGREE, KNOWN_DEGREE = 20, 12  # of the tesserals: what pulls, and what the table on board has
 
-Jobs = Annotated[int | None, typer.Option("--jobs", metavar="N", help="Processes.  Default: one a core.")]
+Jobs = Annotated[int | None, typer.Option("--jobs", min=1, metavar="N", help="Processes.  Default: one a core.")]
 Dask = Annotated[
     str | None,
     typer.Option(
@@ -93,7 +93,7 @@ def command(
     from acu_daemon.groundtrack.simulate import Case, Outcome, check_case, make_world
     from acu_daemon.groundtrack.storms import with_storms
 
-    refuse_unwritable(plot)
+    refuse_no_picture(plot)
     flux = load_flux(profile)
     world = make_world(with_storms(flux, storms, seed) if storms else flux)
     case = Case(

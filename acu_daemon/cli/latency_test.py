@@ -12,6 +12,7 @@ import typer
 
 from acu_daemon.cli.check import GO, NO_GO, WARN, Finding, clock_finding
 from acu_daemon.cli.options import check_duration, coming_pass, load_target
+from acu_daemon.cli.outputs import refuse_no_picture, refuse_unwritable
 from acu_daemon.cli.run import make_job
 from acu_daemon.config import load_station
 from acu_daemon.config_tables import StationFile
@@ -66,6 +67,8 @@ def command(
     Exit status: 0 no item is NO-GO; 1 one is; 2 wrong use or configuration.
     """
     check_duration(duration)
+    refuse_unwritable(json_file)
+    refuse_no_picture(plot)
     scheduling = keep_to_this_thread()
     station = None if config is None else load_station(config)
     link = None if station is None else make_link(station.acu.url)

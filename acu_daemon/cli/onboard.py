@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from acu_daemon.cli.outputs import refuse_unwritable, write_ascii
+from acu_daemon.cli.outputs import refuse_no_picture, refuse_unwritable, write_ascii
 from acu_daemon.edge.campaign import progress_bar, results_of, run_campaign
 from acu_daemon.edge.onboard import PlannedPass, load_pass
 from acu_daemon.edge.onboard_scenarios import Run, run_scenario
@@ -55,7 +55,8 @@ def profile(
 
     Exit status 1: no profile keeps to margin, ranges and limits; the message says what would.
     """
-    refuse_unwritable(out, plot)
+    refuse_unwritable(out)
+    refuse_no_picture(plot)
     planned = load_pass(pass_file)
     for warning in planned.warnings:
         typer.echo(f"warning: {warning}", err=True)
@@ -114,7 +115,9 @@ def scenarios(
     count: Annotated[int, typer.Option("--count", metavar="N", min=1, help="Scenarios; 66 are eleven of a kind.")] = 66,
     seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Of the first one; they count up.")] = 0,
     margin_deg: Annotated[float, typer.Option("--margin-deg", metavar="M", help="Half cone at the satellite.")] = 1.0,
-    jobs: Annotated[int | None, typer.Option("--jobs", metavar="N", help="Processes.  Default: one a core.")] = None,
+    jobs: Annotated[
+        int | None, typer.Option("--jobs", min=1, metavar="N", help="Processes.  Default: one a core.")
+    ] = None,
     dask: Annotated[str | None, typer.Option("--dask", metavar="ADDRESS", help="Run on this dask scheduler.")] = None,
     imaging: Annotated[bool, typer.Option("--imaging", help="Plan each for a quiet camera too.")] = False,
     json_file: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write the rows, JSON.")] = None,

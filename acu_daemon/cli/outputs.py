@@ -5,12 +5,21 @@ from pathlib import Path
 
 from acu_daemon.errors import UsageError
 
+_PICTURES = (".png", ".svg", ".pdf")
+
 
 def refuse_unwritable(*paths: Path | None) -> None:
     """UsageError: a file cannot be made at one of the paths; says why."""
     for path in paths:
         if path is not None and (reason := _why_not(path)):
             raise UsageError(f"{path}{reason}")
+
+
+def refuse_no_picture(path: Path | None) -> None:
+    """UsageError: no picture can be drawn into this file."""
+    if path is not None and path.suffix.lower() not in _PICTURES:
+        raise UsageError(f"--plot {path}: expected a name that ends in {', '.join(_PICTURES)}")
+    refuse_unwritable(path)
 
 
 def _why_not(path: Path) -> str | None:

@@ -110,7 +110,9 @@ def _cluster(address: str) -> Iterator[None]:
     try:
         client_of: Any = import_module("distributed").Client
     except ImportError:
-        raise UsageError("--dask needs dask: pip install 'acu-daemon[cluster]', here and on every worker") from None
+        raise UsageError(
+            f"--dask {address} needs dask: pip install 'acu-daemon[cluster]', here and on every worker"
+        ) from None
     try:
         client = client_of(address, timeout=CONNECT_S, set_as_default=True)
     except (OSError, ValueError) as error:

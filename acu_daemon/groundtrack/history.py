@@ -8,12 +8,13 @@ are needed.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import gcd
+from itertools import pairwise
+from math import gcd, radians
 from typing import NamedTuple
 
 import numpy as np
 
-from acu_daemon.errors import UsageError
+from acu_daemon.errors import OrbitError, UsageError
 from acu_daemon.groundtrack.environment import even_steps, running_integral
 from acu_daemon.groundtrack.lunisolar import plane_rates
 from acu_daemon.groundtrack.reference import Cycle, ReferenceOrbit, phased
@@ -28,6 +29,9 @@ LONGEST_CYCLE_DAYS = 45
 KEPT_WITHIN_M, _SHARE_OF_SPACING = 20_000.0, 0.25  # a satellite that is kept stays within +- this, and this share
 _EARTH_RATE_RAD_S = 2.0 * np.pi / DAY_S * (1.0 + 1.0 / 365.2421897)
 _PER_DAY = 1e-3  # of the revolutions a day: some 300 m of the semi-major axis
+_PER_DAY_SPARSE = 2e-4  # where gaps leave little else to go by; sets of phased satellites are within 1e-4 of theirs
+_UNSURE_M_DAY = 500.0  # by how much dD/dt within a gap may differ from that at its ends: manoeuvres, drag
+_OTHER_A_M, _OTHER_I_RAD = 10_000.0, radians(1.0)  # farther from the others: no manoeuvre that keeps a phase
 _NODE_STEPS = 6
 _FARTHEST_A_M = 2_000.0  # of the mean orbit from that of its cycle; the elements' own bias is a few hundred
 LONGEST_GAP_DAYS = 15.0
@@ -64,10 +68,12 @@ class History:
 
 
 def crossing_near(propagator: Propagator, tai_s: float, revolution_s: float) -> Crossing:
-    """The ascending node nearest to a time.  Raises: OrbitError: no position there."""
+    """The ascending node nearest to a time.  Raises: OrbitError: no position there, or no node."""
     times_s = tai_s + np.linspace(-0.75, 0.75, 61) * revolution_s
     z = propagator.states_teme(times_s)[0][:, 2]
     rising = np.flatnonzero((z[:-1] < 0.0) & (z[1:] >= 0.0))
+    if rising.size == 0:
+        raise OrbitError("the orbit does not cross the equator: a satellite above it has no ground track to keep")
     k = min(rising, key=lambda one: abs(times_s[one] - tai_s))
     at_s = float(times_s[k] - z[k] * (times_s[k + 1] - times_s[k]) / (z[k + 1] - z[k]))
     for _ in range(_NODE_STEPS):
@@ -91,7 +97,13 @@ def find_cycle(crossings: Sequence[Crossing], means: Sequence[MeanOrbit]) -> Cyc
     """
     per_day = float(np.median([revolutions_per_day(one) for one in means]))
     cycles = [Cycle(round(per_day * days), days) for days in range(1, LONGEST_CYCLE_DAYS + 1)]
-    candidates = [one for one in cycles if gcd(*one) == 1 and abs(one.per_day - per_day) < _PER_DAY]
+    longest_gap_s = max(float(after.tai_s - before.tai_s) for before, after in pairwise(crossings))
+    candidates = [
+        one
+        for one in cycles
+        if gcd(*one) == 1
+        and abs(one.per_day - per_day) < (_PER_DAY if longest_gap_s < _bridged_s(one) else _PER_DAY_SPARSE)
+    ]
     if not candidates:
         raise UsageError(
             f"no repeat cycle of up to {LONGEST_CYCLE_DAYS} days fits: the satellite makes {per_day:.5f} revolutions a "
@@ -140,7 +152,10 @@ def history_of(
 def unwound(
     cycle: Cycle, crossings: Sequence[Crossing], reference: ReferenceOrbit, means: Sequence[MeanOrbit]
 ) -> Array:
-    """D in metres (N,), zero at the first: of all that the folding allows, each is the nearest to what is expected."""
+    """D in metres (N,), zero at the first: of all that the folding allows, each is the nearest to what is expected.
+
+    Across a gap in which the drift is lost D is expected where it was: a phased satellite is kept.
+    """
     spacing = spacing_m(cycle)
     folded = np.array([one.longitude_rad for one in crossings]) * EARTH_EQUATORIAL_RADIUS_M
     tai_s = np.array([one.tai_s for one in crossings])
@@ -149,10 +164,23 @@ def unwound(
     d_m = np.empty_like(folded)
     d_m[0] = 0.0
     for k in range(1, folded.size):
-        expected = d_m[k - 1] + 0.5 * (rates[k] + rates[k - 1]) * (tai_s[k] - tai_s[k - 1])
+        gap_s = float(tai_s[k] - tai_s[k - 1])
+        drift_m = 0.5 * float(rates[k] + rates[k - 1]) * gap_s if gap_s < _bridged_s(cycle) else 0.0
+        expected = d_m[k - 1] + drift_m
         seen = folded[k] - folded[0]
         d_m[k] = seen + spacing * round(float((expected - seen) / spacing))
     return d_m
+
+
+def _bridged_s(cycle: Cycle) -> float:
+    """The longest gap over which the drift at its ends tells D to a quarter of the spacing."""
+    return 0.25 * spacing_m(cycle) / _UNSURE_M_DAY * DAY_S
+
+
+def is_of_another_orbit(means: Sequence[MeanOrbit]) -> list[bool]:
+    """Which mean orbits are so far from the median that they are of another satellite, or of before it was phased."""
+    a_m, i_rad = (float(np.median([one[k] for one in means])) for k in (0, 2))
+    return [abs(one.a_m - a_m) > _OTHER_A_M or abs(one.i_rad - i_rad) > _OTHER_I_RAD for one in means]
 
 
 def _sky_m(reference: ReferenceOrbit, tai_s: Array, node_rad: float) -> Array:

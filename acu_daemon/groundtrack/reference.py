@@ -127,12 +127,12 @@ def phased(cycle: Cycle, e: float, i_rad: float) -> ReferenceOrbit:
         return _alpha_rate(rates) - cycle.per_day * (earth_rate - rates.raan_rad_s)
 
     for _ in range(_MAX_STEPS):
+        if a_m < EARTH_EQUATORIAL_RADIUS_M:
+            raise UsageError(f"{cycle.revolutions} revolutions in {cycle.days} days: that orbit lies below the ground")
         step_m = -missing(a_m) * 2.0 * _STEP_A_M / (missing(a_m + _STEP_A_M) - missing(a_m - _STEP_A_M))
         a_m += step_m
         if abs(step_m) < _SOLVED_A_M:
             break
-    if a_m < EARTH_EQUATORIAL_RADIUS_M:
-        raise UsageError(f"{cycle.revolutions} revolutions in {cycle.days} days: that orbit lies below the ground")
     return about(cycle, a_m, e, i_rad)
 
 

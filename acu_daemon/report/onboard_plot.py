@@ -52,7 +52,7 @@ def plot_profile(
     rows[3].set_xlim(0.0, float(task.view.time_s[-1]))
     _draw_ground(ground, task, chosen, station)
     _draw_margins(margins, task, profiles)
-    figure.savefig(path, format="png")
+    figure.savefig(path)
 
 
 def _draw_camera(axes: Axes, task: Task) -> None:
