@@ -1,14 +1,17 @@
-"""Memories of the decision for tests: made by the names of their fields, whatever part holds them."""
+"""Memories of the decision for tests: made by the names of their fields, whatever part holds them; and a judge."""
 
 from dataclasses import fields, replace
 from typing import Any
 
 from acu_daemon.control.state import ControlState
+from acu_daemon.control.status_plausibility import Plausibility, judge
+from acu_daemon.model import AxisLimits
+from acu_daemon.protocol.messages import Status
 
 PART_OF = {
     field.name: part.name
     for part in fields(ControlState)
-    if part.name not in ("turn", "encoders")
+    if part.name not in ("turn", "encoders", "plausibility")
     for field in fields(getattr(ControlState(), part.name))
 }
 
@@ -21,3 +24,15 @@ def remembering(before: ControlState | None = None, /, **changes: Any) -> Contro
         new = value if part is None else replace(getattr(state, part), **{name: value})
         state = replace(state, **{part or name: new})
     return state
+
+
+class Judge:
+    """Judges one status after another."""
+
+    def __init__(self, azimuth: AxisLimits, elevation: AxisLimits) -> None:
+        self._limits = azimuth, elevation
+        self.known = Plausibility()
+
+    def believes(self, status: Status, tai_s: float) -> bool:
+        self.known = judge(self.known, status, tai_s, *self._limits)
+        return self.known.is_believed

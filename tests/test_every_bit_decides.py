@@ -7,12 +7,12 @@ import pytest
 from memories import remembering
 from test_tick import AZ_DEG, CONFIG, EL_DEG, NOW, PLAN, SKY, path, ready, saw, status
 
-from acu_daemon.control.doubt import contradictions
 from acu_daemon.control.orders import Orders
 from acu_daemon.control.state import ControlState, Held
 from acu_daemon.control.states import TrackState
+from acu_daemon.control.status_plausibility import contradictions
 from acu_daemon.control.tick import tick
-from acu_daemon.control.tick_input import Exchange, Observation, Sky
+from acu_daemon.control.tick_input import Exchange, Observation, Sky, TickInput
 from acu_daemon.model import AxisLimits, Prediction, Reading
 from acu_daemon.protocol.messages import AcuMode, Backup, Faults, ReadFaults, Status
 
@@ -35,7 +35,7 @@ def ticks(state: ControlState, statuses: list[Status], sky: Sky) -> tuple[Contro
     for k, seen in enumerate(statuses):
         now = NOW + 0.1 * k
         reading = Reading(now - 0.09, seen.az_deg, seen.el_deg, seen.is_acquired)
-        state, orders = tick(state, Observation(reading, seen), sky, now, CONFIG)
+        state, orders = tick(state, TickInput(Observation(reading, seen), sky, now), CONFIG)
         ordered.append(orders)
     return state, ordered
 
@@ -90,11 +90,11 @@ def test_a_switch_shows_the_end_at_which_the_antenna_is_whatever_the_sector_bit_
 ) -> None:
     config = replace(CONFIG, azimuth=AxisLimits(*limits, 20.0, 10.0))
     at_end = replace(status(AcuMode.STANDBY, is_sector_high=is_high, **{switch: True}), az_deg=place_deg % 360.0)
-    assert tick(ControlState(), saw(at_end), Sky(), NOW, config)[0].intake.az_deg == pytest.approx(place_deg)
+    assert tick(ControlState(), TickInput(saw(at_end), Sky(), NOW), config)[0].intake.az_deg == pytest.approx(place_deg)
     for other in set(ENDS) - {switch}:  # no switch at the other end, and none of the elevation, says so
         wrong = replace(at_end, **{switch: False, other: True})
-        by_bit, _ = tick(ControlState(), saw(replace(wrong, **{other: False})), Sky(), NOW, config)
-        shown, _ = tick(ControlState(), saw(wrong), Sky(), NOW, config)
+        by_bit, _ = tick(ControlState(), TickInput(saw(replace(wrong, **{other: False})), Sky(), NOW), config)
+        shown, _ = tick(ControlState(), TickInput(saw(wrong), Sky(), NOW), config)
         if limits == (-180.0, 180.0) and not other.startswith(("is_at_up", "is_at_down")):
             assert shown.intake.az_deg == -place_deg  # both ends have the bearing
         else:
@@ -157,9 +157,9 @@ def test_a_bit_alone_changes_the_orders_where_the_table_says_so_and_nowhere_else
 def test_a_fault_bit_that_comes_or_goes_is_asked_about_again(flag: str, others: bool) -> None:
     seen = status(AcuMode.FAULT, is_autotrack_selected=False, **dict.fromkeys(FAULT_FLAGS, others))
     answered = saw(seen, extra=Exchange(ReadFaults(), Faults(azimuth=1)))
-    state, orders = tick(ready(TrackState.FAULT, seen), answered, SKY, NOW, CONFIG)
+    state, orders = tick(ready(TrackState.FAULT, seen), TickInput(answered, SKY, NOW), CONFIG)
     assert orders.extra is None
-    _, orders = tick(state, saw(replace(seen, **{flag: not others})), SKY, NOW + 0.2, CONFIG)
+    _, orders = tick(state, TickInput(saw(replace(seen, **{flag: not others})), SKY, NOW + 0.2), CONFIG)
     assert orders.extra == ReadFaults()
 
 
@@ -171,7 +171,7 @@ def test_a_standby_is_the_acus_own_where_an_interlock_fault_is_new_and_else_anot
     held = Held(had_interlock_fault)
     before = remembering(ready(TrackState.HOLD_TLE, status(AcuMode.REMOTE_BACKUP)), held=held, hold_from_tai_s=NOW)
     seen = status(AcuMode.STANDBY, **({flag: True} if flag else {}))
-    state, _ = tick(before, saw(seen), SKY, NOW, CONFIG)
+    state, _ = tick(before, TickInput(saw(seen), SKY, NOW), CONFIG)
     is_own = flag == "has_interlock_fault" and not had_interlock_fault
     assert (state.arming.disarmed_by == "") == is_own
 
@@ -183,12 +183,14 @@ def test_of_the_fault_detail_the_emergency_stop_and_the_door_disarm_and_the_watc
 ) -> None:
     faults = Faults(**{nibble: 1 << bit})
     seen = status(AcuMode.FAULT, is_autotrack_selected=False, has_interlock_fault=True)
-    state, _ = tick(ready(TrackState.FAULT, seen), saw(seen, extra=Exchange(ReadFaults(), faults)), SKY, NOW, CONFIG)
+    state, _ = tick(
+        ready(TrackState.FAULT, seen), TickInput(saw(seen, extra=Exchange(ReadFaults(), faults)), SKY, NOW), CONFIG
+    )
     by = {("interlock", 0): "the emergency stop", ("interlock", 1): "an open door"}
     assert state.arming.disarmed_by == by.get((nibble, bit), "")
     standby = status(AcuMode.STANDBY)
     doubted = remembering(ready(TrackState.IDLE, standby), is_doubted=True, held=Held())
-    state, _ = tick(doubted, Observation(extra=Exchange(ReadFaults(), faults)), SKY, NOW, CONFIG)
+    state, _ = tick(doubted, TickInput(Observation(extra=Exchange(ReadFaults(), faults)), SKY, NOW), CONFIG)
     assert (state.arming.disarmed_by == "") == ((nibble, bit) == ("system", 1))
     assert not state.foreign_stop.is_doubted
 

@@ -7,17 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from memories import remembering
+from memories import Judge, remembering
 
 from acu_daemon.control.axis_watch import AxesWatch, AxisSeen, Bounds, Duty, sky_scale, watch_axes
 from acu_daemon.control.causes import HEARD_BEAMS, ON_POINT_BEAMS, RESUME_DEG, find_causes
 from acu_daemon.control.control_config import ControlConfig
-from acu_daemon.control.doubt import CONFIRMED_COUNT, CONFIRMED_DEG, RATE_MARGIN, SLACK_DEG, Doubt
 from acu_daemon.control.encoder_watch import FROZEN_DEG, EncoderWatch, watch_encoders
 from acu_daemon.control.gate import gate
 from acu_daemon.control.search import DWELL_S, ON_PLACE_BEAMS, go_on, look, pace_s_s, row_deg
 from acu_daemon.control.state import Scan, Stage
 from acu_daemon.control.states import Cause, TrackState
+from acu_daemon.control.status_plausibility import CONFIRMED_COUNT, CONFIRMED_DEG, RATE_MARGIN, SLACK_DEG
 from acu_daemon.control.tick_input import PassPlan, Sky
 from acu_daemon.control.track_frame import beside, offset_of
 from acu_daemon.model import AxisLimits, Model, Pointing, Prediction, Reading
@@ -247,15 +247,15 @@ def test_a_status_is_doubted_and_confirmed_by_its_angle_on_the_sky(el_deg: float
     here = Status(100.0, el_deg, AcuMode.STANDBY)
     cos_el = np.cos(np.radians(el_deg))
     for share, is_believed in ((0.9, True), (1.1, False)):
-        doubt = Doubt(drive, drive)
+        doubt = Judge(drive, drive)
         doubt.believes(here, NOW)
         jump_deg = share * (SLACK_DEG / cos_el + RATE_MARGIN * 0.1 * drive.max_rate_deg_s)
         assert doubt.believes(replace(here, az_deg=(100.0 + side * jump_deg) % 360.0), NOW + 0.1) == is_believed
-        doubt = Doubt(drive, drive)
+        doubt = Judge(drive, drive)
         for k in range(CONFIRMED_COUNT):
             place = (100.0 + side * k * share * CONFIRMED_DEG / cos_el) % 360.0
             doubt.believes(replace(here, az_deg=place), NOW + 0.1 * k)
-        assert doubt.is_confirmed == is_believed
+        assert doubt.known.is_confirmed == is_believed
 
 
 @el_places
@@ -299,11 +299,11 @@ def test_an_elevation_that_outruns_its_drive_is_doubted_and_one_that_moves_is_no
     drive = AxisLimits(-270.0, 270.0, 2.0, 10.0)
     here = Status(100.0, 40.0, AcuMode.STANDBY)
     for share, is_believed in ((0.9, True), (1.1, False)):
-        doubt = Doubt(drive, drive)
+        doubt = Judge(drive, drive)
         doubt.believes(here, NOW)
         jump_deg = side * share * (SLACK_DEG + RATE_MARGIN * 0.1 * drive.max_rate_deg_s)
         assert doubt.believes(replace(here, el_deg=40.0 + jump_deg), NOW + 0.1) == is_believed
-        doubt = Doubt(drive, drive)
+        doubt = Judge(drive, drive)
         for k in range(CONFIRMED_COUNT):
             doubt.believes(replace(here, el_deg=40.0 + side * k * share * CONFIRMED_DEG), NOW + 0.1 * k)
-        assert doubt.is_confirmed == is_believed
+        assert doubt.known.is_confirmed == is_believed

@@ -17,9 +17,10 @@ from flights import (
 from flights import RISING_TAI_S as T
 from hypothesis import given
 from hypothesis import strategies as st
+from memories import Judge
 from promise_rig import Rig, demo_scene
 
-from acu_daemon.control.doubt import Doubt, contradictions
+from acu_daemon.control.status_plausibility import contradictions
 from acu_daemon.protocol.messages import AcuMode, Backup, Command, SelectBackup, SelectMode, Status, Stow
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.parts import AcuParts
@@ -39,7 +40,7 @@ HOLDING = Status(
 
 def told(*statuses: Status, apart_s: float = 0.1) -> list[bool]:
     """Which of them, one after another, are believed."""
-    doubt = Doubt(AZIMUTH, ELEVATION)
+    doubt = Judge(AZIMUTH, ELEVATION)
     return [doubt.believes(status, 1000.0 + i * apart_s) for i, status in enumerate(statuses)]
 
 
@@ -142,10 +143,10 @@ def test_after_a_silence_an_antenna_may_be_anywhere_its_drive_reaches() -> None:
 def test_p2_after_a_silence_a_place_is_sure_once_three_in_a_row_agree(
     statuses: list[Status], apart_s: float, is_confirmed: bool
 ) -> None:
-    doubt = Doubt(AZIMUTH, ELEVATION)
+    doubt = Judge(AZIMUTH, ELEVATION)
     for i, status in enumerate(statuses):
         doubt.believes(status, 1000.0 + i * apart_s)
-    assert doubt.is_confirmed is is_confirmed
+    assert doubt.known.is_confirmed is is_confirmed
 
 
 @given(st.floats(-20.0, 20.0), st.floats(-5.0, 5.0), st.floats(-89.0, 89.0))

@@ -14,7 +14,7 @@ from acu_daemon.control.orders import Orders
 from acu_daemon.control.state import ControlState, Held, Stage, Watchdog
 from acu_daemon.control.states import ACTIVE, TrackState
 from acu_daemon.control.tick import tick
-from acu_daemon.control.tick_input import Exchange, Observation, Request, Sky
+from acu_daemon.control.tick_input import Exchange, Observation, Request, Sky, TickInput
 from acu_daemon.protocol.messages import (
     Ack,
     AcuMode,
@@ -65,7 +65,7 @@ def run(
     for k in range(count):
         observed = saw(seen, extra=extra, **(first if k == 0 else {}))
         observed = replace(observed, reading=replace(observed.reading, tai_s=NOW + 0.1 * k))
-        state, orders = tick(state, observed, FITTED, NOW + 0.1 * (k + 1), config)
+        state, orders = tick(state, TickInput(observed, FITTED, NOW + 0.1 * (k + 1)), config)
         sent += [command for command in (orders.first, orders.extra) if command is not None]
         asked = asked_by(orders)
         extra = Exchange(asked, replies.get(asked, Ack())) if asked is not None else None
@@ -96,7 +96,7 @@ def test_p1_a_stop_that_is_not_acknowledged_is_repeated_and_nothing_else_is_sent
     state, sent = moving(), []
     for k in range(20):
         observed = saw(status(AcuMode.REMOTE_BACKUP), requests=(Request.DISARM,) if k == 0 else ())
-        state, orders = tick(state, observed, FITTED, NOW + 0.1 * k, GUARDED)
+        state, orders = tick(state, TickInput(observed, FITTED, NOW + 0.1 * k), GUARDED)
         sent += orders_of([orders.first, *([orders.extra] if orders.extra else [])])
     assert set(sent) == {Stop()}
     assert len(sent) >= 5
@@ -106,7 +106,7 @@ def test_p1_armed_again_it_begins_with_the_present_angles() -> None:
     state, _ = run(moving(), status(AcuMode.REMOTE_BACKUP), 10, requests=(Request.DISARM,))
     armed = saw(status(AcuMode.STANDBY), requests=(Request.ARM,))
     armed = replace(armed, reading=replace(armed.reading, tai_s=NOW + 4.9))
-    state, orders = tick(state, armed, FITTED, NOW + 5.0, GUARDED)
+    state, orders = tick(state, TickInput(armed, FITTED, NOW + 5.0), GUARDED)
     assert state.is_armed(GUARDED)
     assert state.startup.stage is Stage.REGISTERS_KNOWN
     assert asked_by(orders) == ReadParameter("S")
@@ -150,7 +150,7 @@ def test_p6_latched_it_sends_stop_until_it_is_acknowledged_and_no_more(mode: Acu
 
 def test_p6_the_latch_outlives_a_lost_link_and_whatever_the_acu_does() -> None:
     state, _ = run(latched(), status(AcuMode.STANDBY), 5)
-    state, _ = tick(state, Observation(silence_s=3.0), FITTED, NOW + 9.0, GUARDED)
+    state, _ = tick(state, TickInput(Observation(silence_s=3.0), FITTED, NOW + 9.0), GUARDED)
     assert state.tracking.track is TrackState.LINK_LOST
     for mode in AcuMode:
         state, sent = run(state, status(mode), 12)
@@ -162,7 +162,7 @@ def test_p6_the_latch_outlives_a_lost_link_and_whatever_the_acu_does() -> None:
 def test_p6_a_restart_with_a_latch_knows_the_acu_stops_the_antenna_once_and_moves_nothing() -> None:
     state, sent, extra = remembering(problem=LATCH, is_stop_due=True), [], None
     for k in range(30):
-        state, orders = tick(state, saw(status(AcuMode.REMOTE), extra=extra), FITTED, NOW + 0.1 * k, GUARDED)
+        state, orders = tick(state, TickInput(saw(status(AcuMode.REMOTE), extra=extra), FITTED, NOW + 0.1 * k), GUARDED)
         asked = asked_by(orders)
         reply = Identity("3842", "S1") if isinstance(asked, Identify) else Ack()
         extra = Exchange(asked, reply) if asked is not None else None
@@ -176,7 +176,9 @@ def test_p6_only_a_person_clears_it_and_the_start_order_begins_anew() -> None:
     state, _ = run(latched(), status(AcuMode.STANDBY), 5)
     state, _ = run(state, status(AcuMode.STANDBY), 3, requests=(Request.ARM, Request.DISARM, Request.ARM))
     assert state.latch.problem == LATCH
-    state, orders = tick(state, saw(status(AcuMode.STANDBY), requests=(Request.CLEAR,)), FITTED, NOW + 9.0, GUARDED)
+    state, orders = tick(
+        state, TickInput(saw(status(AcuMode.STANDBY), requests=(Request.CLEAR,)), FITTED, NOW + 9.0), GUARDED
+    )
     assert state.latch.problem == ""
     assert state.startup.stage < Stage.READY
     assert not isinstance(orders.first, WriteAndPoll)
@@ -292,15 +294,15 @@ def test_a_person_who_arms_before_the_acu_answers_is_believed() -> None:
     state, _ = started_again(status(AcuMode.STANDBY), requests=(Request.ARM,))
     assert state.is_armed(GUARDED)
     lost = remembering(moving(), track=TrackState.LINK_LOST, stage=Stage.NEW, in_force=(NOW - 2.0, 100.0, 40.0))
-    lost, _ = tick(lost, Observation(silence_s=2.0, requests=(Request.ARM,)), FITTED, NOW, GUARDED)
+    lost, _ = tick(lost, TickInput(Observation(silence_s=2.0, requests=(Request.ARM,)), FITTED, NOW), GUARDED)
     assert run(lost, status(AcuMode.STANDBY))[0].is_armed(GUARDED)
 
 
 def test_an_acu_found_autotracking_far_from_the_path_is_not_believed() -> None:
     other = replace(status(), az_deg=200.0, el_deg=15.0)
     state = remembering(ready(TrackState.IDLE, other), az_deg=-160.0)
-    assert tick(state, saw(other), FITTED, NOW, CONFIG)[0].tracking.track is TrackState.PREPOSITION
-    assert tick(ready(TrackState.IDLE, status()), saw(status()), FITTED, NOW, CONFIG)[0].tracking.track is (
+    assert tick(state, TickInput(saw(other), FITTED, NOW), CONFIG)[0].tracking.track is TrackState.PREPOSITION
+    assert tick(ready(TrackState.IDLE, status()), TickInput(saw(status()), FITTED, NOW), CONFIG)[0].tracking.track is (
         TrackState.AUTOTRACK_FITTED
     )
 
@@ -449,7 +451,7 @@ def test_p5_from_every_state_mode_and_stage_every_order_has_passed_the_fence(is_
 
 def check_fence(state: ControlState, seen: Observation, sky: Sky, *, is_shadow: bool) -> None:
     config = SHADOW if is_shadow else GUARDED
-    after, orders = tick(state, seen, sky, NOW, config)
+    after, orders = tick(state, TickInput(seen, sky, NOW), config)
     assert after.refusals.refusal_count == state.refusals.refusal_count  # the fence had nothing to keep back
     for command in (orders.first, orders.extra):
         assert command is None or refusal(command, after, config) == ""
@@ -472,7 +474,7 @@ def test_the_watchdog_is_read_written_and_read_back_once_the_start_is_done() -> 
     code, asked = 0, []
     extra = None
     for k in range(12):
-        state, orders = tick(state, saw(status(AcuMode.STANDBY), extra=extra), SKY, NOW + 0.1 * k, GUARDED)
+        state, orders = tick(state, TickInput(saw(status(AcuMode.STANDBY), extra=extra), SKY, NOW + 0.1 * k), GUARDED)
         extra = None
         if isinstance(orders.extra, ReadParameter):
             extra = Exchange(orders.extra, Parameter("W", code))
@@ -492,7 +494,7 @@ def test_an_acu_without_watchdog_is_told_once_and_tracked_all_the_same(reply) ->
         extra = Exchange(last, reply if getattr(last, "name", "") == "W" else Ack()) if last is not None else None
         observed = saw(seen, extra=extra)
         observed = replace(observed, reading=replace(observed.reading, tai_s=NOW + 0.1 * k - 0.09))
-        state, orders = tick(state, observed, FITTED, NOW + 0.1 * k, GUARDED)
+        state, orders = tick(state, TickInput(observed, FITTED, NOW + 0.1 * k), GUARDED)
         last = orders.extra
         events += [event.name for event in orders.events]
         sent.append(orders.extra)

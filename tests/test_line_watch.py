@@ -6,14 +6,14 @@ from typing import Any
 import pytest
 from structlog.testing import capture_logs
 
+from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.line_watch import LineWatch
 
 
 def looks(*garbled_counts: int | None) -> list[bool]:
     """Whether there is an alarm, second after second; a count is of its connection, None: the link is down."""
     port: Any = SimpleNamespace(is_up=True, failed_exchange_count=0, garbled_count=0, discarded_count=0, late_count=0)
-    doubt: Any = SimpleNamespace(count=0)
-    watch, alarms = LineWatch(port, doubt), []
+    watch, alarms = LineWatch(port, CommonArea()), []
     for count in garbled_counts:
         port.is_up, port.garbled_count = count is not None, count or 0
         watch.look()

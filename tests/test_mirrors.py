@@ -11,6 +11,7 @@ from troubled_decision import TroubledDecision
 from acu_daemon.control.orders import Orders
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick import tick
+from acu_daemon.control.tick_input import TickInput
 from acu_daemon.protocol.angles import LSB_DEG
 from acu_daemon.protocol.messages import Command, WriteAndPoll, WriteRegisters
 
@@ -74,7 +75,7 @@ def test_the_mirrored_world_gets_the_mirrored_commands_and_the_same_events(name:
     decision, ordered = run_of(seed)
     config, state = mirror.config(decision.config), ControlState()
     for k, (one, (plain, orders)) in enumerate(zip(decision.given, ordered, strict=True)):
-        state, of_mirror = tick(state, mirror.seen(one.seen), mirror.sky(one.sky), one.now_tai_s, config)
+        state, of_mirror = tick(state, TickInput(mirror.seen(one.seen), mirror.sky(one.sky), one.now_tai_s), config)
         assert same(orders.first, of_mirror.first, mirror), (k, orders, of_mirror)
         assert same(orders.extra, of_mirror.extra, mirror), (k, orders, of_mirror)
         assert facts(orders) == facts(of_mirror), (k, orders, of_mirror)

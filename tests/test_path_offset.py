@@ -15,7 +15,7 @@ from acu_daemon.assist.session.prediction import predict
 from acu_daemon.control.state import ControlState, PathOffset
 from acu_daemon.control.states import TrackState
 from acu_daemon.control.tick import tick
-from acu_daemon.control.tick_input import Sky
+from acu_daemon.control.tick_input import Sky, TickInput
 from acu_daemon.control.track_frame import beside, extents, offset_of
 from acu_daemon.model import Model, Prediction, sky_angle_deg
 from acu_daemon.orbit.look import look_at
@@ -80,7 +80,7 @@ def test_what_is_autotracked_in_another_state_tells_nothing_of_the_path_nor_of_t
     state = ready(track, other)
     for k in range(30):
         reading = replace(saw(other).reading, tai_s=NOW - 200.0 + 0.1 * k)  # type: ignore[type-var]
-        state, _ = tick(state, replace(saw(other), reading=reading), SKY, NOW - 199.9 + 0.1 * k, CONFIG)
+        state, _ = tick(state, TickInput(replace(saw(other), reading=reading), SKY, NOW - 199.9 + 0.1 * k), CONFIG)
     assert (state.signal.offset, state.signal.has_acquired, state.signal.has_locked, state.encoders.problem) == (
         None,
         False,
@@ -92,14 +92,14 @@ def test_what_is_autotracked_in_another_state_tells_nothing_of_the_path_nor_of_t
 def test_forty_degrees_aside_are_refused_once_told_and_drive_nothing() -> None:
     az_deg, el_deg = far()
     wrong = replace(status(), az_deg=az_deg, el_deg=el_deg)
-    state, orders = tick(ready(TrackState.AUTOTRACK_TLE, wrong), saw(wrong), SKY, NOW, CONFIG)
+    state, orders = tick(ready(TrackState.AUTOTRACK_TLE, wrong), TickInput(saw(wrong), SKY, NOW), CONFIG)
     assert [event.name for event in orders.events] == ["offset.refused"]
     assert state.signal.offset is None
-    again, orders = tick(state, saw(wrong), SKY, NOW + 0.1, CONFIG)
+    again, orders = tick(state, TickInput(saw(wrong), SKY, NOW + 0.1), CONFIG)
     assert [event.name for event in orders.events] == []
     assert isinstance(orders.first, WriteAndPoll)
     assert orders.first.az_deg == pytest.approx(AZ_DEG, abs=0.2)
-    held, _ = tick(again, saw(status(AcuMode.REMOTE_BACKUP)), SKY, NOW + 0.2, CONFIG)
+    held, _ = tick(again, TickInput(saw(status(AcuMode.REMOTE_BACKUP)), SKY, NOW + 0.2), CONFIG)
     assert (held.tracking.track, held.signal.offset) == (TrackState.HOLD_TLE, None)
 
 
@@ -119,8 +119,8 @@ def learned() -> ControlState:
 def test_it_is_forgotten_with_the_pass() -> None:
     other = replace(SKY, plan=replace(PLAN, rise_tai_s=NOW - 50.0))
     lost = status(AcuMode.REMOTE_BACKUP)
-    kept, _ = tick(learned(), saw(lost), SKY, NOW, CONFIG)
-    state, _ = tick(learned(), saw(lost), other, NOW, CONFIG)
+    kept, _ = tick(learned(), TickInput(saw(lost), SKY, NOW), CONFIG)
+    state, _ = tick(learned(), TickInput(saw(lost), other, NOW), CONFIG)
     known = PathOffset(2.0, 0.3, Model.ELEMENTS)
     assert (kept.signal.offset, kept.signal.has_locked, kept.signal.has_acquired) == (known, True, True)
     assert (state.signal.offset, state.signal.has_locked, state.signal.has_acquired) == (None, False, False)
@@ -129,7 +129,7 @@ def test_it_is_forgotten_with_the_pass() -> None:
 def test_what_was_learned_beside_one_model_is_not_put_beside_another() -> None:
     assert SKY.prediction is not None
     other = Sky(replace(SKY.prediction, model=Model.LAST_PASS), None, PLAN)
-    _, orders = tick(learned(), saw(status(AcuMode.REMOTE_BACKUP)), other, NOW, CONFIG)
+    _, orders = tick(learned(), TickInput(saw(status(AcuMode.REMOTE_BACKUP)), other, NOW), CONFIG)
     assert isinstance(orders.first, WriteAndPoll)
     assert orders.first.az_deg == pytest.approx(AZ_DEG, abs=0.1)
 

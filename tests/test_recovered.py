@@ -7,17 +7,17 @@ from math import nan
 import numpy as np
 import pytest
 from fake_sky import AZIMUTH, ELEVATION
-from memories import remembering
+from memories import Judge, remembering
 
 from acu_daemon.control.axis_watch import AWAY_S, AxesWatch, AxisSeen, Bounds, Duty, watch_axes
 from acu_daemon.control.control_config import ControlConfig
-from acu_daemon.control.doubt import CONTRADICTING_COUNT, MOVED_COUNT, Doubt
 from acu_daemon.control.encoder_watch import EncoderWatch, watch_encoders
 from acu_daemon.control.start import WATCHDOG, WATCHDOG_TRY_S, after_reply
 from acu_daemon.control.state import ControlState, Stage, Watchdog
 from acu_daemon.control.states import TrackState
+from acu_daemon.control.status_plausibility import CONTRADICTING_COUNT, MOVED_COUNT
 from acu_daemon.control.tick import tick
-from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Sky
+from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Sky, TickInput
 from acu_daemon.control.turn import BIT_SCORE, DENIED_COUNT, TurnWatch, locate, watch_pull
 from acu_daemon.model import Correction, FitResult, Pointing, Prediction, Reading
 from acu_daemon.protocol.messages import (
@@ -105,7 +105,7 @@ def run(change: Change | None, lasts: int) -> tuple[ControlState, list[str]]:
         seen, sky = Observation(reading, status, extra=extra), SKY
         if change is not None and BEGIN <= k < BEGIN + lasts:
             seen, sky = change(seen, sky, k)
-        state, orders = tick(state, seen, sky, now, CONFIG)
+        state, orders = tick(state, TickInput(seen, sky, now), CONFIG)
         names += [event.name for event in orders.events]
         for command in (orders.first, orders.extra):
             if isinstance(command, WriteAndPoll | WriteRegisters):
@@ -188,7 +188,7 @@ def test_after_good_ticks_the_memory_is_that_of_a_run_without_the_trouble(troubl
 
 @pytest.mark.parametrize("bad", range(1, CONTRADICTING_COUNT))
 def test_doubtful_statuses_add_up_only_in_a_row(bad: int) -> None:
-    doubt, right = Doubt(AZIMUTH, ELEVATION), replace(good(0), has_changed=True)
+    doubt, right = Judge(AZIMUTH, ELEVATION), replace(good(0), has_changed=True)
     wrong, k, believed = replace(right, is_backup_active=True), 0, []
     doubt.believes(right, NOW)
     for _ in range(5):
@@ -257,7 +257,7 @@ def test_tries_of_the_register_watchdog_that_an_answer_ended_do_not_count_for_th
         for share in (0.0, 0.9):
             silent = Exchange(ReadParameter(WATCHDOG), None)
             state = after_reply(state, silent, now + share * WATCHDOG_TRY_S, config, [])
-            assert state.watchdog is Watchdog.UNKNOWN
+            assert state.startup.watchdog is Watchdog.UNKNOWN
         answered = Exchange(ReadParameter(WATCHDOG), Parameter(WATCHDOG, 100))
         state = after_reply(state, answered, now + 0.95 * WATCHDOG_TRY_S, config, [])
         assert state.startup.watchdog is Watchdog.SET

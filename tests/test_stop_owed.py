@@ -14,7 +14,7 @@ from acu_daemon.cli.virtual_pass import Stage as Rigged
 from acu_daemon.control.fence import READS
 from acu_daemon.control.state import ControlState, Stage, Watchdog
 from acu_daemon.control.tick import tick
-from acu_daemon.control.tick_input import Exchange, Observation, Request
+from acu_daemon.control.tick_input import Exchange, Observation, Request, TickInput
 from acu_daemon.pointing.axis import AxisState
 from acu_daemon.protocol.messages import AcuMode, Command, Nak, Reply, Status, Stop, WriteParameter
 
@@ -24,7 +24,7 @@ SILENT_S = 9.0
 
 def asked(state: ControlState, *requests: Request) -> ControlState:
     """What a person says while the link is down."""
-    return tick(state, Observation(silence_s=SILENT_S, requests=requests), SKY, NOW, GUARDED)[0]
+    return tick(state, TickInput(Observation(silence_s=SILENT_S, requests=requests), SKY, NOW), GUARDED)[0]
 
 
 @pytest.mark.parametrize(
@@ -55,7 +55,7 @@ def test_cleared_and_armed_the_daemon_goes_on_and_owes_no_stop(requests) -> None
 def test_p1_armed_or_cleared_nothing_of_the_registers_before_is_gone_on_from(request_: Request) -> None:
     before = remembering(latched(), axis_az=AxisState(200.0, 5.0), axis_el=AxisState(60.0, 2.0), was_followed=True)
     before = remembering(before, by_people=False) if request_ is Request.ARM else before
-    state, _ = tick(before, saw(status(AcuMode.REMOTE), requests=(request_,)), FITTED, NOW, GUARDED)
+    state, _ = tick(before, TickInput(saw(status(AcuMode.REMOTE), requests=(request_,)), FITTED, NOW), GUARDED)
     assert (state.registers.axis_az, state.registers.axis_el, state.registers.was_followed) == (None, None, False)
 
 
@@ -66,7 +66,7 @@ def extras(state: ControlState, seen: Status, reply: Reply | None) -> list[Comma
     for k in range(20):
         observed = saw(seen, extra=extra)
         observed = replace(observed, reading=replace(observed.reading, tai_s=NOW + 0.1 * k))
-        state, orders = tick(state, observed, FITTED, NOW + 0.1 * (k + 1), GUARDED)
+        state, orders = tick(state, TickInput(observed, FITTED, NOW + 0.1 * (k + 1)), GUARDED)
         extra = Exchange(orders.extra, reply) if orders.extra is not None else None
         sent.append(orders.extra)
     return sent

@@ -18,7 +18,7 @@ from acu_daemon.control.registers import REFUSED_PAUSE_S
 from acu_daemon.control.state import ControlState, Lag, Stage
 from acu_daemon.control.states import ACTIVE, TrackState
 from acu_daemon.control.tick import tick
-from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Sky
+from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Sky, TickInput
 from acu_daemon.model import AxisLimits, Prediction, Reading
 from acu_daemon.pointing.axis import AxisState
 from acu_daemon.protocol.angles import LSB_DEG
@@ -90,7 +90,7 @@ def saw(seen: Status, **changes: object) -> Observation:
 def step(
     track: TrackState, seen: Status, sky: Sky = SKY, config: ControlConfig = CONFIG, **changes: object
 ) -> tuple[ControlState, Orders]:
-    return tick(ready(track, seen), saw(seen, **changes), sky, NOW, config)
+    return tick(ready(track, seen), TickInput(saw(seen, **changes), sky, NOW), config)
 
 
 # What is sent
@@ -114,7 +114,7 @@ def test_before_a_fit_the_registers_hold_the_reading_plus_the_motion_over_the_le
 
 def test_a_late_tick_aims_for_the_moment_it_really_writes() -> None:
     seen = status()
-    _, orders = tick(ready(TrackState.AUTOTRACK_FITTED, seen), saw(seen), FITTED, NOW + 0.35, CONFIG)
+    _, orders = tick(ready(TrackState.AUTOTRACK_FITTED, seen), TickInput(saw(seen), FITTED, NOW + 0.35), CONFIG)
     assert isinstance(orders.first, WriteAndPoll)
     assert orders.first.az_deg == pytest.approx(AZ_DEG + AZ_RATE * (0.35 + LEAD_S), abs=LSB_DEG)
 
@@ -128,7 +128,7 @@ def test_a_lag_is_learned_only_from_writes_that_come_a_period_apart(gap_s: float
         az_deg, el_deg = AZ_DEG + AZ_RATE * (k * gap_s - 0.05), EL_DEG + EL_RATE * (k * gap_s - 0.05)
         seen = replace(status(AcuMode.REMOTE_BACKUP), az_deg=az_deg, el_deg=el_deg)
         reading = Reading(now_tai_s - gap_s, az_deg, el_deg, is_locked=False)
-        state, _ = tick(state, Observation(reading=reading, status=seen), FITTED, now_tai_s, CONFIG)
+        state, _ = tick(state, TickInput(Observation(reading=reading, status=seen), FITTED, now_tai_s), CONFIG)
     assert (state.lag.az.count > 0) is is_learned
     assert (state.lag.el.count > 0) is is_learned
 
@@ -141,7 +141,9 @@ def test_a_latch_forgets_the_lag_that_was_learned_of_an_axis_that_failed() -> No
     learned_s, _ = state.lag_s(CONFIG)
     for k in range(100):
         reading = Reading(NOW + 0.1 * k + 0.01, AZ_DEG, EL_DEG, False)  # it stands while the path goes on
-        state, _ = tick(state, Observation(reading=reading, status=seen), FITTED, NOW + 0.1 * (k + 1), CONFIG)
+        state, _ = tick(
+            state, TickInput(Observation(reading=reading, status=seen), FITTED, NOW + 0.1 * (k + 1)), CONFIG
+        )
         if state.latch.problem:
             break
         assert state.lag.az.count >= 500
@@ -152,7 +154,9 @@ def test_a_latch_forgets_the_lag_that_was_learned_of_an_axis_that_failed() -> No
 
 def test_the_tilt_register_goes_back_as_it_was_read() -> None:
     seen = status()
-    _, orders = tick(remembering(ready(TrackState.IDLE, seen), tilt_code=4321), saw(seen), Sky(), NOW, CONFIG)
+    _, orders = tick(
+        remembering(ready(TrackState.IDLE, seen), tilt_code=4321), TickInput(saw(seen), Sky(), NOW), CONFIG
+    )
     assert isinstance(orders.first, WriteAndPoll)
     assert orders.first.tilt_code == 4321
 
@@ -171,12 +175,12 @@ def test_without_room_in_the_cycle_an_extra_takes_the_place_of_one_write() -> No
 def test_without_room_no_two_writes_in_a_row_give_way() -> None:
     seen = status(AcuMode.STANDBY, backup_selected=Backup.RATE)
     state = remembering(ready(TrackState.HOLD_FITTED, seen), entered_tai_s=NOW - 1.0, hold_from_tai_s=NOW)
-    state, orders = tick(state, saw(seen, has_room=False), FITTED, NOW, CONFIG)
+    state, orders = tick(state, TickInput(saw(seen, has_room=False), FITTED, NOW), CONFIG)
     assert orders.first == SelectBackup(Backup.REMOTE)
     selected = replace(seen, backup_selected=Backup.REMOTE)
-    state, orders = tick(state, saw(selected, has_room=False), FITTED, NOW + 0.1, CONFIG)
+    state, orders = tick(state, TickInput(saw(selected, has_room=False), FITTED, NOW + 0.1), CONFIG)
     assert isinstance(orders.first, WriteAndPoll)
-    _, orders = tick(state, saw(selected, has_room=False), FITTED, NOW + 0.2, CONFIG)
+    _, orders = tick(state, TickInput(saw(selected, has_room=False), FITTED, NOW + 0.2), CONFIG)
     assert orders.first == SelectMode(AcuMode.AUTOTRACK)
 
 
@@ -196,7 +200,7 @@ def test_under_the_local_panel_it_polls_and_nothing_else(track: TrackState) -> N
 @pytest.mark.parametrize("mode", list(AcuMode))
 def test_disarmed_it_only_reads(track: TrackState, mode: AcuMode) -> None:
     state = remembering(ready(track, status(mode)), stage=Stage.REGISTERS_KNOWN)
-    _, orders = tick(state, saw(status(mode)), SKY, NOW, replace(CONFIG, is_armed=False))
+    _, orders = tick(state, TickInput(saw(status(mode)), SKY, NOW), replace(CONFIG, is_armed=False))
     assert orders.first == Poll()
     assert orders.extra is None or isinstance(orders.extra, ReadFaults)
 
@@ -204,7 +208,7 @@ def test_disarmed_it_only_reads(track: TrackState, mode: AcuMode) -> None:
 @pytest.mark.parametrize("stage", [stage for stage in Stage if stage is not Stage.READY])
 def test_before_the_start_is_done_no_path_is_written_and_no_mode_selected(stage: Stage) -> None:
     state = remembering(ready(TrackState.IDLE, status(AcuMode.STANDBY)), stage=stage)
-    _, orders = tick(state, saw(status(AcuMode.STANDBY)), FITTED, NOW, CONFIG)
+    _, orders = tick(state, TickInput(saw(status(AcuMode.STANDBY)), FITTED, NOW), CONFIG)
     for order in (orders.first, orders.extra):
         assert not isinstance(order, WriteAndPoll | SelectMode | SelectBackup)
 
@@ -219,7 +223,7 @@ def test_a_start_goes_on_without_a_poll_while_it_is_sure_where_the_antenna_is(
     """On a slow line each poll beside the start's exchanges would cost half a tick."""
     seen = status(AcuMode.STANDBY)
     state = remembering(ready(TrackState.IDLE, seen), stage=Stage.NEW)
-    _, orders = tick(state, saw(seen, is_confirmed=is_confirmed), FITTED, NOW + later_s, CONFIG)
+    _, orders = tick(state, TickInput(saw(seen, is_confirmed=is_confirmed), FITTED, NOW + later_s), CONFIG)
     assert orders.first == first
 
 
@@ -230,7 +234,7 @@ def test_the_backup_is_selected_before_the_mode_and_the_mode_only_once_the_backu
     for backup, wanted in ((Backup.RATE, SelectBackup(Backup.REMOTE)), (Backup.REMOTE, SelectMode(AcuMode.AUTOTRACK))):
         seen = status(AcuMode.STANDBY, backup_selected=backup)
         state = remembering(ready(TrackState.ACQUIRE_TLE, seen), entered_tai_s=NOW - 1.0)
-        _, orders = tick(state, saw(seen), SKY, NOW, CONFIG)
+        _, orders = tick(state, TickInput(saw(seen), SKY, NOW), CONFIG)
         assert orders.extra == wanted
 
 
@@ -251,23 +255,23 @@ def test_the_state_says_what_steers_also_when_the_elements_steer_again(
     track: TrackState, mode: AcuMode, after: TrackState
 ) -> None:
     before = remembering(ready(track, status(mode)), hold_from_tai_s=NOW - 40.0)
-    state, orders = tick(before, saw(status(mode)), SKY, NOW, CONFIG)
+    state, orders = tick(before, TickInput(saw(status(mode)), SKY, NOW), CONFIG)
     assert state.tracking.track is after
     assert "newer readings deny the fit" in str(orders.events[0].fields["cause"])
     assert state.tracking.hold_from_tai_s == NOW - 40.0  # the loss is no younger for it
-    assert tick(before, saw(status(mode)), FITTED, NOW, CONFIG)[0].tracking.track is track
+    assert tick(before, TickInput(saw(status(mode)), FITTED, NOW), CONFIG)[0].tracking.track is track
 
 
 @pytest.mark.parametrize(("sky", "after"), [(SKY, TrackState.HOLD_TLE), (FITTED, TrackState.HOLD_FITTED)])
 def test_after_a_search_the_state_names_what_it_goes_back_to(sky: Sky, after: TrackState) -> None:
     before = remembering(ready(TrackState.SEARCH, status(AcuMode.ACQUIRE)), entered_tai_s=NOW - 121.0)
-    assert tick(before, saw(status(AcuMode.ACQUIRE)), sky, NOW, CONFIG)[0].tracking.track is after
+    assert tick(before, TickInput(saw(status(AcuMode.ACQUIRE)), sky, NOW), CONFIG)[0].tracking.track is after
 
 
 @pytest.mark.parametrize("config", [CONFIG, replace(CONFIG, is_armed=False)])
 @pytest.mark.parametrize("track", [TrackState.IDLE, TrackState.ACQUIRE_TLE])
 def test_where_a_fit_steers_no_state_says_that_the_elements_do(config: ControlConfig, track: TrackState) -> None:
-    state, _ = tick(ready(track, status(AcuMode.ACQUIRE)), saw(status(AcuMode.ACQUIRE)), FITTED, NOW, config)
+    state, _ = tick(ready(track, status(AcuMode.ACQUIRE)), TickInput(saw(status(AcuMode.ACQUIRE)), FITTED, NOW), config)
     assert state.tracking.track is TrackState.HOLD_FITTED
 
 
@@ -276,13 +280,13 @@ def test_a_signal_that_was_never_locked_is_searched_for_after_acquire_s(has_lock
     lost = status(AcuMode.REMOTE_BACKUP, is_acquired=False)
     since_tai_s = NOW - CONFIG.acquire_s - 1.0
     state = remembering(ready(TrackState.HOLD_TLE, lost), has_locked=has_locked, hold_from_tai_s=since_tai_s)
-    assert tick(state, saw(lost), SKY, NOW, CONFIG)[0].tracking.track is track
+    assert tick(state, TickInput(saw(lost), SKY, NOW), CONFIG)[0].tracking.track is track
 
 
 def test_silence_of_the_link_makes_everything_start_anew() -> None:
     seen = status()
     state = remembering(ready(TrackState.AUTOTRACK_FITTED, seen), is_place_sure=True)
-    state, orders = tick(state, Observation(silence_s=LINK_SILENCE_S + 0.01), FITTED, NOW, CONFIG)
+    state, orders = tick(state, TickInput(Observation(silence_s=LINK_SILENCE_S + 0.01), FITTED, NOW), CONFIG)
     assert state.tracking.track is TrackState.LINK_LOST
     assert state.startup.stage is Stage.NEW
     assert not state.intake.is_place_sure  # on a fresh connection the place of the old one is not written
@@ -302,20 +306,24 @@ def test_a_fault_ends_every_active_state_and_asks_once_what_it_is(track: TrackSt
     assert state.tracking.track is TrackState.FAULT
     assert orders.extra == ReadFaults()
     answered = saw(seen, extra=Exchange(ReadFaults(), Faults(azimuth=1)))
-    state, later = tick(state, answered, SKY, NOW, CONFIG)
+    state, later = tick(state, TickInput(answered, SKY, NOW), CONFIG)
     assert later.extra is None
-    assert tick(state, saw(seen), SKY, NOW + 0.4, CONFIG)[1].extra is None
+    assert tick(state, TickInput(saw(seen), SKY, NOW + 0.4), CONFIG)[1].extra is None
 
 
 def test_a_fault_detail_is_asked_for_until_it_is_answered_and_again_when_the_bits_change() -> None:
     seen = status(AcuMode.FAULT, is_autotrack_selected=False, has_azimuth_fault=True)
     state, _ = step(TrackState.AUTOTRACK_FITTED, seen)
-    state, orders = tick(state, saw(seen, extra=Exchange(ReadFaults(), None)), SKY, NOW + EXTRA_REPEAT_S, CONFIG)
+    state, orders = tick(
+        state, TickInput(saw(seen, extra=Exchange(ReadFaults(), None)), SKY, NOW + EXTRA_REPEAT_S), CONFIG
+    )
     assert orders.extra == ReadFaults()
     state = remembering(state, again_tai_s=NOW)
-    state, orders = tick(state, saw(seen, extra=Exchange(ReadFaults(), Faults(azimuth=1))), SKY, NOW, CONFIG)
+    state, orders = tick(state, TickInput(saw(seen, extra=Exchange(ReadFaults(), Faults(azimuth=1))), SKY, NOW), CONFIG)
     assert orders.extra is None
-    assert tick(state, saw(replace(seen, has_interlock_fault=True)), SKY, NOW, CONFIG)[1].extra == ReadFaults()
+    assert (
+        tick(state, TickInput(saw(replace(seen, has_interlock_fault=True)), SKY, NOW), CONFIG)[1].extra == ReadFaults()
+    )
 
 
 @pytest.mark.parametrize("track", sorted(ACTIVE))
@@ -326,7 +334,7 @@ def test_a_stow_from_elsewhere_ends_every_active_state_and_nothing_leaves_it(tra
     assert orders.extra is None
     stowed = replace(stowing, mode=AcuMode.STOWED)
     for k in range(20):
-        state, orders = tick(state, saw(stowed), SKY, NOW + 1.0 + k, CONFIG)
+        state, orders = tick(state, TickInput(saw(stowed), SKY, NOW + 1.0 + k), CONFIG)
         assert orders.extra is None
     assert state.tracking.track is TrackState.STOW
 
@@ -339,7 +347,7 @@ def test_p5_what_the_gate_refuses_is_counted_every_time_and_logged_once() -> Non
     wrong = replace(FITTED, prediction=replace(path("FITTED"), el_deg=path().el_deg + np.nan))
     state, events = remembering(ready(TrackState.HOLD_FITTED, held), hold_from_tai_s=NOW), []
     for k, sky in enumerate([wrong, wrong, FITTED, wrong]):
-        state, orders = tick(state, saw(held), sky, NOW + 0.1 * k, CONFIG)
+        state, orders = tick(state, TickInput(saw(held), sky, NOW + 0.1 * k), CONFIG)
         events.append([event.fields["reason"] for event in orders.events if event.name == "gate.refused"])
     assert state.refusals.refusal_count == 3
     assert events == [["not a finite angle"], [], [], ["not a finite angle"]]
@@ -355,7 +363,7 @@ def test_p5_an_axis_outside_its_limits_is_held_there_and_the_other_one_follows(m
     within = replace(FITTED, prediction=replace(path("FITTED"), el_deg=path().el_deg - 5.0))
     for k in range(60):
         sky = within if 20 <= k < 25 or k >= 30 else FITTED
-        state, orders = tick(state, saw(held), sky, NOW + 0.1 * k, flat)
+        state, orders = tick(state, TickInput(saw(held), sky, NOW + 0.1 * k), flat)
         told += [(k, event.name) for event in orders.events if event.name.startswith("gate.")]
         assert isinstance(orders.first, WriteAndPoll)
         assert orders.first.el_deg <= 38.0
@@ -368,7 +376,7 @@ def test_p5_an_axis_outside_its_limits_is_held_there_and_the_other_one_follows(m
 def test_p5_what_the_gate_holds_back_is_counted() -> None:
     held = status(AcuMode.REMOTE_BACKUP)
     far = replace(FITTED, prediction=replace(path("FITTED"), follow_az_deg=path().az_deg + 3.0))
-    state, _ = tick(ready(TrackState.HOLD_FITTED, held), saw(held), far, NOW, CONFIG)
+    state, _ = tick(ready(TrackState.HOLD_FITTED, held), TickInput(saw(held), far, NOW), CONFIG)
     assert (state.refusals.clamped_count, state.refusals.refusal_count) == (1, 0)
 
 
@@ -384,9 +392,9 @@ def test_one_refused_write_is_not_held_against_the_next_two_are() -> None:
     seen = status()
     state, orders = step(TrackState.AUTOTRACK_FITTED, seen, FITTED, refused=Nak())
     assert isinstance(orders.first, WriteAndPoll)
-    state, orders = tick(state, saw(seen, refused=Nak()), FITTED, NOW + 0.1, CONFIG)
+    state, orders = tick(state, TickInput(saw(seen, refused=Nak()), FITTED, NOW + 0.1), CONFIG)
     assert orders.first == Poll()
-    _, orders = tick(state, saw(seen), FITTED, NOW + 0.1 + REFUSED_PAUSE_S + 0.01, CONFIG)
+    _, orders = tick(state, TickInput(saw(seen), FITTED, NOW + 0.1 + REFUSED_PAUSE_S + 0.01), CONFIG)
     assert isinstance(orders.first, WriteAndPoll)
 
 
@@ -395,10 +403,10 @@ def test_a_refused_write_is_not_in_force_and_an_answered_one_is() -> None:
     state, orders = step(TrackState.AUTOTRACK_FITTED, seen, FITTED)
     assert isinstance(orders.first, WriteAndPoll)
     assert (
-        tick(state, saw(seen, refused=Nak()), FITTED, NOW + 0.1, CONFIG)[0].registers.in_force
+        tick(state, TickInput(saw(seen, refused=Nak()), FITTED, NOW + 0.1), CONFIG)[0].registers.in_force
         == state.registers.in_force
     )
-    answered, _ = tick(state, saw(seen), FITTED, NOW + 0.1, CONFIG)
+    answered, _ = tick(state, TickInput(saw(seen), FITTED, NOW + 0.1), CONFIG)
     assert answered.registers.in_force is not None
     assert answered.registers.in_force[1:] == (orders.first.az_deg, orders.first.el_deg)
 
@@ -411,7 +419,7 @@ def extras_over(refusal: Nak | None, span_s: float) -> int:
         extra = Exchange(last, refusal) if last is not None else None
         observed = saw(seen, extra=extra)
         observed = replace(observed, reading=replace(observed.reading, tai_s=NOW + 0.1 * k - 0.09))
-        state, orders = tick(state, observed, FITTED, NOW + 0.1 * k, CONFIG)
+        state, orders = tick(state, TickInput(observed, FITTED, NOW + 0.1 * k), CONFIG)
         last, sent = orders.extra, sent + (orders.extra is not None)
     return sent
 
@@ -420,7 +428,9 @@ def test_on_a_status_from_before_an_outage_nothing_is_decided() -> None:
     seen = status(AcuMode.STANDBY)
     stale = remembering(ready(TrackState.HOLD_FITTED, seen), reading=saw(seen).reading)
     for stage in (Stage.NEW, Stage.REGISTERS_KNOWN, Stage.SECTOR_FREE, Stage.READY):
-        _, orders = tick(remembering(stale, stage=stage), Observation(), FITTED, NOW + LINK_SILENCE_S + 0.1, CONFIG)
+        _, orders = tick(
+            remembering(stale, stage=stage), TickInput(Observation(), FITTED, NOW + LINK_SILENCE_S + 0.1), CONFIG
+        )
         assert orders.extra is None
         assert isinstance(orders.first, Poll | WriteAndPoll)
 
@@ -430,15 +440,17 @@ def test_no_mode_is_selected_while_the_registers_are_old() -> None:
     state = remembering(
         ready(TrackState.HOLD_FITTED, seen), entered_tai_s=NOW - 1.0, in_force=(NOW - 5.0, AZ_DEG, EL_DEG)
     )
-    assert tick(state, saw(seen), FITTED, NOW, CONFIG)[1].extra is None
-    assert tick(remembering(state, in_force=(NOW - 0.1, AZ_DEG, EL_DEG)), saw(seen), FITTED, NOW, CONFIG)[1].extra
+    assert tick(state, TickInput(saw(seen), FITTED, NOW), CONFIG)[1].extra is None
+    assert tick(remembering(state, in_force=(NOW - 0.1, AZ_DEG, EL_DEG)), TickInput(saw(seen), FITTED, NOW), CONFIG)[
+        1
+    ].extra
 
 
 def test_autotrack_that_is_selected_in_standby_is_deselected_first_once_it_is_no_transient() -> None:
     seen = status(AcuMode.STANDBY, is_autotrack_selected=True)
     state = ready(TrackState.HOLD_FITTED, seen)
-    assert tick(state, saw(seen), FITTED, NOW, CONFIG)[1].extra == SelectMode(AcuMode.STANDBY)
-    assert tick(remembering(state, again_tai_s=NOW), saw(seen), FITTED, NOW, CONFIG)[1].extra is None
+    assert tick(state, TickInput(saw(seen), FITTED, NOW), CONFIG)[1].extra == SelectMode(AcuMode.STANDBY)
+    assert tick(remembering(state, again_tai_s=NOW), TickInput(saw(seen), FITTED, NOW), CONFIG)[1].extra is None
 
 
 def test_a_refused_extra_is_repeated_far_more_rarely_than_a_lost_one() -> None:
@@ -466,9 +478,9 @@ def test_whatever_the_acu_says_no_write_is_outside_the_limits_and_the_input_is_u
     seen = replace(status(mode), az_deg=az_deg, el_deg=el_deg, is_remote_enabled=is_remote, is_sector_high=is_high)
     before = ready(track, seen)
     kept = replace(before)
-    state, orders = tick(before, saw(seen, has_room=has_room), sky, NOW, CONFIG)
+    state, orders = tick(before, TickInput(saw(seen, has_room=has_room), sky, NOW), CONFIG)
     assert before == kept
-    assert tick(before, saw(seen, has_room=has_room), sky, NOW, CONFIG) == (state, orders)
+    assert tick(before, TickInput(saw(seen, has_room=has_room), sky, NOW), CONFIG) == (state, orders)
     for command in (orders.first, orders.extra):
         check_allowed(command, seen)
 
@@ -484,6 +496,6 @@ def test_registers_read_back_wrong_are_written_again_before_any_mode() -> None:
     seen = status(AcuMode.STANDBY)
     state = remembering(ready(TrackState.IDLE, seen), stage=Stage.PRESENT_WRITTEN, present_deg=(AZ_DEG, EL_DEG))
     wrong = Exchange(ReadRegisters(), Registers(AZ_DEG + 5.0, EL_DEG, 0, 3))
-    state, orders = tick(state, saw(seen, extra=wrong), FITTED, NOW, CONFIG)
+    state, orders = tick(state, TickInput(saw(seen, extra=wrong), FITTED, NOW), CONFIG)
     assert state.startup.stage is Stage.SECTOR_FREE
     assert isinstance(orders.first, WriteRegisters)

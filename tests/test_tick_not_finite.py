@@ -18,7 +18,7 @@ from acu_daemon.control.refit import RefitReply, RefitRequest
 from acu_daemon.control.state import ControlState, PathOffset, Stage
 from acu_daemon.control.states import TrackState
 from acu_daemon.control.tick import tick
-from acu_daemon.control.tick_input import Observation, Sky
+from acu_daemon.control.tick_input import Observation, Sky, TickInput
 from acu_daemon.edge.fit import InlineFitRunner
 from acu_daemon.model import Correction, FitResult, Model
 from acu_daemon.pointing.axis import AxisState
@@ -85,13 +85,13 @@ def test_p5_one_field_that_is_not_finite_never_raises_and_never_reaches_a_comman
         if k in (1, 2):
             seen = spoiled(seen, path, bad) if name == "seen" else seen
             sky = spoiled(sky, path, bad) if name == "sky" else sky
-        state, orders = tick(state, seen, sky, NOW + 0.1 * k, CONFIG)
+        state, orders = tick(state, TickInput(seen, sky, NOW + 0.1 * k), CONFIG)
         check(orders)
 
 
 @given(bad=st.sampled_from(NOT_FINITE[:3]), track=st.sampled_from(sorted(TrackState)))
 def test_p5_without_a_finite_time_it_polls(bad, track):
-    state, orders = tick(memory(track, AcuMode.AUTOTRACK), seen_in(AcuMode.AUTOTRACK), SKY, bad, CONFIG)
+    state, orders = tick(memory(track, AcuMode.AUTOTRACK), TickInput(seen_in(AcuMode.AUTOTRACK), SKY, bad), CONFIG)
     check(orders)
     assert not isinstance(orders.first, WriteAndPoll)
     assert state.refusals.refusal_count == 1
@@ -101,13 +101,13 @@ def test_p5_without_a_finite_time_it_polls(bad, track):
 @pytest.mark.parametrize("field", ["az_deg", "el_deg", "az_rate_deg_s", "el_rate_deg_s"])
 def test_p5_a_prediction_that_is_not_finite_is_refused_and_counted_and_the_last_register_stays(field, bad):
     mode = AcuMode.AUTOTRACK
-    state, first = tick(memory(TrackState.AUTOTRACK_FITTED, mode), seen_in(mode), SKY, NOW, CONFIG)
+    state, first = tick(memory(TrackState.AUTOTRACK_FITTED, mode), TickInput(seen_in(mode), SKY, NOW), CONFIG)
     sky = spoiled(SKY, ("prediction", field), bad)
-    state, orders = tick(state, seen_in(mode), sky, NOW + 0.1, CONFIG)
+    state, orders = tick(state, TickInput(seen_in(mode), sky, NOW + 0.1), CONFIG)
     assert orders.first == first.first
     assert state.refusals.refusal_count == 1
     assert [event.name for event in orders.events] == ["gate.refused"]
-    state, orders = tick(state, seen_in(mode), SKY, NOW + 0.2, CONFIG)
+    state, orders = tick(state, TickInput(seen_in(mode), SKY, NOW + 0.2), CONFIG)
     assert isinstance(orders.first, WriteAndPoll)
     assert orders.first != first.first
 
@@ -116,7 +116,7 @@ def test_p5_a_prediction_that_is_not_finite_is_refused_and_counted_and_the_last_
 def test_p5_a_status_that_is_not_finite_is_not_taken_and_the_last_one_stays(path):
     mode = AcuMode.AUTOTRACK
     before = memory(TrackState.AUTOTRACK_FITTED, mode)
-    state, orders = tick(before, spoiled(seen_in(mode), path, nan), SKY, NOW, CONFIG)
+    state, orders = tick(before, TickInput(spoiled(seen_in(mode), path, nan), SKY, NOW), CONFIG)
     assert (state.intake.status, state.intake.az_deg) == (before.intake.status, before.intake.az_deg)
     assert state.refusals.refusal_count == 1
     assert orders.events[0].fields == {"input": "status", "reason": "not finite"}
@@ -128,7 +128,7 @@ def test_p5_an_offset_that_is_not_finite_reaches_no_command(place):
     state = remembering(memory(TrackState.HOLD_TLE, AcuMode.REMOTE_BACKUP), offset=offset)
     sky = replace(SKY, prediction=replace(SKY.prediction, model=Model.ELEMENTS), fit=None)
     seen = saw(replace(status(AcuMode.REMOTE_BACKUP), is_acquired=False))
-    state, orders = tick(state, seen, sky, NOW, CONFIG)
+    state, orders = tick(state, TickInput(seen, sky, NOW), CONFIG)
     check(orders)
     assert state.refusals.refusal_count == 1
 

@@ -14,7 +14,7 @@ from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.orders import Orders
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick import tick
-from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Request, Sky
+from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Request, Sky, TickInput
 from acu_daemon.model import AxisLimits, Correction, FitResult, Model, Prediction, Reading
 from acu_daemon.protocol.messages import AcuMode, Nak, SelectMode, Status, Stop, Stow
 from acu_daemon.sim.acu import FakeAcu
@@ -65,15 +65,6 @@ class Swing(Star):
         return float(az_deg[0]) % 360.0, float(el_deg[0]), 1e6
 
 
-@dataclass(frozen=True)
-class Given:
-    """What a tick was given."""
-
-    seen: Observation
-    sky: Sky
-    now_tai_s: float
-
-
 @dataclass
 class Trouble:
     """One at a time."""
@@ -91,7 +82,7 @@ class TroubledDecision:
 
     seed: int
     random: Random = field(init=False)
-    given: list[Given] = field(init=False, default_factory=list)
+    given: list[TickInput] = field(init=False, default_factory=list)
 
     def __post_init__(self) -> None:
         self.random = Random(self.seed)
@@ -161,9 +152,9 @@ class TroubledDecision:
         for k in range(count):
             now_s = PERIOD_S * (k + 1) + (0.02 * self.random.random() if self.random.random() < 0.05 else 0.0)
             self._next_trouble(now_s)
-            one = Given(self._observe(now_s), self.sky(now_s), START_TAI_S + now_s)
+            one = TickInput(self._observe(now_s), self.sky(now_s), START_TAI_S + now_s)
             self.given.append(one)
-            self.state, self.orders = tick(self.state, one.seen, one.sky, one.now_tai_s, self.config)
+            self.state, self.orders = tick(self.state, one, self.config)
             yield self.state, self.orders
 
     def _next_trouble(self, now_s: float) -> None:

@@ -35,29 +35,39 @@ class Rejected:
     reason: str
 
 
+MAX_GAP_S = 6.0  # a longer gap between readings breaks the acquisition: nobody saw what happened
+
+
+def acquired_since_tai_s(since_tai_s: float | None, last_tai_s: float | None, reading: Reading) -> float | None:
+    """Since when readings have been acquired without a break, this one included; None: it is not.
+
+    since_tai_s, last_tai_s: the same before this reading, and the time of the last acquired one.
+    """
+    if not reading.is_locked:
+        return None
+    is_new = since_tai_s is None or last_tai_s is None or reading.tai_s - last_tai_s > MAX_GAP_S
+    return reading.tai_s if is_new else since_tai_s
+
+
 class Dwell:
     """Lets readings through that have been acquired for at least the dwell time without a break: locked ones.
 
-    Mutable; one owner.  A gap between readings longer than max_gap_s breaks the acquisition: nobody saw what happened.
+    Mutable; one owner.
     """
 
-    def __init__(self, lock_dwell_s: float, max_gap_s: float = 6.0) -> None:
+    def __init__(self, lock_dwell_s: float) -> None:
         self._dwell_s = lock_dwell_s
-        self._max_gap_s = max_gap_s
         self._since_tai_s: float | None = None
         self._last_tai_s: float | None = None
         self.rejected_count = 0  # acquired, but not for long enough
 
     def is_locked(self, reading: Reading) -> bool:
         """Take the next reading, oldest first, and say whether it counts as locked."""
-        if not reading.is_locked:
-            self._since_tai_s = self._last_tai_s = None
+        since_tai_s = self._since_tai_s = acquired_since_tai_s(self._since_tai_s, self._last_tai_s, reading)
+        self._last_tai_s = None if since_tai_s is None else reading.tai_s
+        if since_tai_s is None:
             return False
-        if self._last_tai_s is None or reading.tai_s - self._last_tai_s > self._max_gap_s:
-            self._since_tai_s = reading.tai_s
-        self._last_tai_s = reading.tai_s
-        since = reading.tai_s if self._since_tai_s is None else self._since_tai_s
-        is_long_enough = reading.tai_s - since >= self._dwell_s - 1e-6
+        is_long_enough = reading.tai_s - since_tai_s >= self._dwell_s - 1e-6
         self.rejected_count += not is_long_enough
         return is_long_enough
 

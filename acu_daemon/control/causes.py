@@ -1,14 +1,15 @@
 """Which causes of a transition are present now (control.states has the table they drive)."""
 
 from dataclasses import replace
-from math import cos, hypot, isfinite, radians
+from math import cos, hypot, radians
 
 from acu_daemon.control.approach import ACQUIRE_LEAD_S, lead_s
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.gate import within_limits
+from acu_daemon.control.plan import pass_end_tai_s
 from acu_daemon.control.state import ControlState, Stage
-from acu_daemon.control.states import AUTOTRACKING, HOLDING, Cause, TrackState
-from acu_daemon.control.tick_input import PassPlan, Sky
+from acu_daemon.control.states import HOLDING, Cause, TrackState
+from acu_daemon.control.tick_input import Sky
 from acu_daemon.control.track_frame import extents, is_within, offset_of
 from acu_daemon.model import Pointing, sky_angle_deg
 from acu_daemon.pointing.wrap import nearest_turn
@@ -20,19 +21,6 @@ HEARD_BEAMS = 1.0  # a signal that is heard so near to the path is the satellite
 RESUME_DEG = 5.0  # an antenna this near to the path goes on from an interruption without a new approach
 BEFORE = frozenset({TrackState.IDLE, TrackState.PREPOSITION})  # only there it matters where the antenna stands
 MODE_SETTLE_S = 3.0  # a MODE SELECT takes a moment to show; only later is a left mode the ACU's own doing
-
-
-def pass_end_tai_s(plan: PassPlan, sky: Sky) -> float:
-    """The end of the pass: its set by the elements, shifted by what the fit found, early or late."""
-    along_s = sky.fit.along_s if sky.fit and isfinite(sky.fit.along_s) else 0.0
-    return plan.set_tai_s + along_s + 1.0
-
-
-def is_tracked(state: ControlState, sky: Sky, now_tai_s: float) -> bool:
-    """Whether this pass is held, or has been: then what was seen of it counts for more than another clock."""
-    plan = sky.plan
-    is_in_pass = plan is not None and plan.rise_tai_s - ACQUIRE_LEAD_S <= now_tai_s <= pass_end_tai_s(plan, sky)
-    return state.tracking.track in AUTOTRACKING or sky.fit is not None or (is_in_pass and state.signal.has_acquired)
 
 
 def find_causes(state: ControlState, sky: Sky, silence_s: float, now_tai_s: float, config: ControlConfig) -> set[Cause]:

@@ -14,6 +14,7 @@ from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.encoder_watch import EncoderWatch
 from acu_daemon.control.lag import LagEstimate
 from acu_daemon.control.states import TrackState
+from acu_daemon.control.status_plausibility import Plausibility
 from acu_daemon.control.turn import TurnWatch
 from acu_daemon.model import Model, Reading
 from acu_daemon.pointing.axis import AxisState
@@ -49,6 +50,16 @@ class Intake:
     az_deg: float = 0.0  # encoder azimuth of the newest status, in the frame of the wrap (continuous)
     track_of_readings: tuple[tuple[float, float, float], ...] = ()  # the newest: time, continuous azimuth, elevation
     is_stow_kept: bool = False  # somebody stowed the antenna while we looked on: it stays, also after a lost link
+
+
+@dataclass(frozen=True)
+class Fitting:
+    """Which readings are given to the fit.  Owner: control.hear."""
+
+    acquired_since_tai_s: float | None = None
+    last_acquired_tai_s: float | None = None
+    dwell_count: int = 0  # readings acquired, but not yet for the dwell time
+    out_of_step_count: int = 0  # locked readings that may answer an earlier command, one that had no answer in time
 
 
 @dataclass(frozen=True)
@@ -217,6 +228,8 @@ class Lag:
 class ControlState:
     """The memory of the 10 Hz decision.  Without slots, as its parts, for `changed` (control.changed)."""
 
+    plausibility: Plausibility = Plausibility()  # owner: control.hear
+    fitting: Fitting = Fitting()
     intake: Intake = Intake()
     startup: Startup = Startup()
     arming: Arming = Arming()

@@ -32,20 +32,19 @@ from acu_daemon.control.start import after_reply, watch_for_power_cycle
 from acu_daemon.control.state import ControlState, Stage
 from acu_daemon.control.states import TrackState
 from acu_daemon.control.supervise import supervise
-from acu_daemon.control.tick_input import Observation, Sky
+from acu_daemon.control.tick_input import Observation, Sky, TickInput
 from acu_daemon.control.walk import walk
 from acu_daemon.protocol.messages import Poll
 
 
-def tick(
-    state: ControlState, seen: Observation, sky: Sky, now_tai_s: float, config: ControlConfig
-) -> tuple[ControlState, Orders]:
-    """Decide one tick.  now_tai_s: the moment the write starts, so that lateness is no pointing error.
+def tick(state: ControlState, given: TickInput, config: ControlConfig) -> tuple[ControlState, Orders]:
+    """Decide one tick.
 
-    What is not finite in seen and sky is left out, counted, and told once; without a finite time it only polls.
+    What is not finite in what it is given is left out, counted, and told once; without a finite time it only polls.
     """
     events: list[Event] = []
-    seen, sky, refused = finite_only(seen, sky)
+    now_tai_s = given.now_tai_s
+    seen, sky, refused = finite_only(given.seen, given.sky)
     state, refused = drop_unusable_offset(state, refused)
     state = refuse_input(state, refused if math.isfinite(now_tai_s) else "time", events)
     if not math.isfinite(now_tai_s):

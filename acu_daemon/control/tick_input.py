@@ -24,6 +24,20 @@ class Exchange:
     reply: Reply | None
 
 
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """A reply, or None at the deadline, and its times: start of the command's write, first byte of the reply.
+
+    is_sure: the reply is to this command, and to none before it that had no answer in time.
+    """
+
+    command: Command
+    reply: Reply | None
+    started_tai_s: float
+    first_byte_tai_s: float | None = None
+    is_sure: bool = True
+
+
 @dataclass(frozen=True)
 class Observation:
     """What the last tick brought.  Copied by `changed`."""
@@ -51,6 +65,7 @@ class PassPlan:
     start_el_deg: float
     note: str = ""  # why the turn is not a good one, when no turn holds the whole pass
     beyond: tuple[OutOfReach, ...] = ()  # when which axis cannot follow
+    learned_count: int = 0  # turns of the azimuth that were learned before it was made
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,3 +75,16 @@ class Sky:
     prediction: Prediction | None = None
     fit: FitResult | None = None
     plan: PassPlan | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TickInput:
+    """All that a tick decides from beside its memory and the configuration.
+
+    now_tai_s: the moment the write starts, so that lateness is no pointing error, by the clock that the times of the
+    readings and of the sky are of.
+    """
+
+    seen: Observation
+    sky: Sky
+    now_tai_s: float

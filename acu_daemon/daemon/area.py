@@ -20,8 +20,6 @@ class CommonArea:
     refit_count: int = 0
     refit_failed_count: int = 0
     gate: GateVerdict = GateVerdict()
-    dwell_count: int = 0  # readings acquired, but not yet for the dwell time
-    out_of_step_count: int = 0  # locked readings that may answer an earlier command, one that had no answer in time
 
     @property
     def model(self) -> Model | None:
@@ -31,7 +29,8 @@ class CommonArea:
     @property
     def rejected_counts(self) -> dict[str, int]:
         """Readings that no fit has seen, by reason."""
-        here = {DWELL: self.dwell_count, OUT_OF_STEP: self.out_of_step_count}
+        fitting = self.state.fitting
+        here = {DWELL: fitting.dwell_count, OUT_OF_STEP: fitting.out_of_step_count}
         return {**self.gate.counts, **{reason: count for reason, count in here.items() if count}}
 
     def take_readings(self) -> Readings:

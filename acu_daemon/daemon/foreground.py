@@ -2,21 +2,19 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import structlog
 
-from acu_daemon.assist.reading_gate import Dwell
 from acu_daemon.control.arming import owes_stop
-from acu_daemon.control.causes import LINK_SILENCE_S, is_acquired
-from acu_daemon.control.changed import changed
+from acu_daemon.control.causes import LINK_SILENCE_S
 from acu_daemon.control.control_config import ControlConfig
-from acu_daemon.control.doubt import Doubt
+from acu_daemon.control.hear import hear
 from acu_daemon.control.orders import Event
 from acu_daemon.control.state import Stage, Watchdog
-from acu_daemon.control.states import AUTOTRACKING
 from acu_daemon.control.tick import tick
-from acu_daemon.control.tick_input import Exchange, Observation, Request
+from acu_daemon.control.tick_input import Arrival, Observation, Request, TickInput
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.clock_watch import ClockWatch
 from acu_daemon.daemon.lateness import Lateness
@@ -68,8 +66,6 @@ class Foreground:
         self._config = config
         self._after_tick = after_tick
         self._on_reading = on_reading
-        self._dwell = Dwell(config.lock_dwell_s)
-        self._doubt = Doubt(config.azimuth, config.elevation)
         self._doubt_again_s = -math.inf
         self._seen = Observation()
         self._requests: tuple[Request, ...] = ()
@@ -82,7 +78,7 @@ class Foreground:
         self.write_count = 0
         self.answered_count = 0  # ordered exchanges that were answered: the work that the watchdog asks for
         self.skipped_tick_count = 0
-        self.line_watch = LineWatch(port, self._doubt)
+        self.line_watch = LineWatch(port, area)
         self.clock_watch = ClockWatch(clock, config.clock_alarm_deg)
         self.lateness = Lateness()
         self.motion = Motion()
@@ -142,25 +138,24 @@ class Foreground:
         first = port.take_first()
         if first is not None and isinstance(first.reply, Status):
             self._status_s = self._clock.monotonic_s()
-            self._take_status(first, first.reply, Poll())
+            self._hear(Poll(), first)
         requests, self._requests = self._requests, ()
-        seen = changed(
+        seen = replace(
             self._seen,
             silence_s=self._silence_s(),
             must_poll=port.must_poll,
             has_room=port.has_room,
             requests=requests,
         )
-        now_tai_s = self._clock.tai_s()
-        area.state, orders = tick(area.state, seen, area.sky, now_tai_s, self._config)
+        given = TickInput(seen, area.sky, self._clock.tai_s())
+        area.state, orders = tick(area.state, given, self._config)
         self._report(orders.events)
         self._seen = Observation()
         if not port.is_up:
             return
         is_answered = await (self._question() if seen.must_poll else self._do(orders.first))
-        is_progress = (
-            not seen.must_poll or area.state.startup.stage is not Stage.READY
-        )  # no poll in the place of a write
+        is_starting = area.state.startup.stage is not Stage.READY
+        is_progress = not seen.must_poll or is_starting  # no poll in the place of a write
         self.answered_count += is_answered and is_progress
         if orders.extra is not None and port.is_up and not port.must_poll:
             await port.idle_gap()
@@ -187,17 +182,9 @@ class Foreground:
             self._status_s = self._clock.monotonic_s()
         if isinstance(command, WriteAndPoll) and isinstance(answer.reply, Status):
             self.write_count += 1
-        if isinstance(answer.reply, Status):
-            self._take_status(answer, answer.reply, command)
-        elif isinstance(command, WriteAndPoll | Poll):
-            if isinstance(answer.reply, Nak):
-                self._seen = changed(self._seen, refused=answer.reply)
-                await self._poll_after_nak(command)
-        else:
-            self._seen = changed(self._seen, extra=Exchange(command, answer.reply))
-            self._report_extra(command, answer)
-            if isinstance(answer.reply, Nak):
-                await self._poll_after_nak(command)
+        self._hear(command, answer)
+        if isinstance(answer.reply, Nak):
+            await self._poll_after_nak(command)
         return answer.reply is not None
 
     async def _question(self) -> bool:
@@ -214,45 +201,33 @@ class Foreground:
         await self._port.idle_gap()
         answer = await self._port.exchange(Poll())
         if isinstance(answer.reply, Status):
-            self._take_status(answer, answer.reply, Poll())
+            self._hear(Poll(), answer)
 
-    def _take_status(self, answer: Answer, status: Status, command: Command) -> None:
-        """Tag the reading: start of the write, wire time and device delay, never after the first byte of the reply."""
-        delay_s = self._config.sample_delay_s
-        if isinstance(command, Poll):
-            delay_s = self._config.poll_sample_delay_s
-        sample_tai_s = answer.started_tai_s + delay_s
-        if answer.first_byte_tai_s is not None:
-            sample_tai_s = min(sample_tai_s, answer.first_byte_tai_s)
-        if not self._doubt.believes(status, sample_tai_s):
-            self._report_doubt(status)
+    def _hear(self, command: Command, answer: Answer) -> None:
+        """Gather a reply for the next decision, and hand its reading on."""
+        area = self._area
+        arrival = Arrival(command, answer.reply, answer.started_tai_s, answer.first_byte_tai_s, answer.is_sure)
+        area.state, heard = hear(area.state, self._seen, arrival, self._config)
+        if heard.seen.extra is not self._seen.extra:
+            self._report_extra(command, answer)
+        self._seen = heard.seen
+        if heard.doubt and isinstance(answer.reply, Status):
+            self._report_doubt(answer.reply, heard.doubt)
+        if heard.reading is None:
             return
-        reading = Reading(sample_tai_s, status.az_deg, status.el_deg, is_acquired(status), status.agc_db)
-        self._seen = changed(
-            self._seen,
-            status=status,
-            reading=reading,
-            is_confirmed=self._doubt.is_confirmed,
-            is_in_step=answer.is_sure,
-        )
-        self.motion.add(reading)
-        is_locked = self._dwell.is_locked(reading)
-        self._area.dwell_count = self._dwell.rejected_count
-        if not answer.is_sure:
-            self._area.out_of_step_count += is_locked
-            return
-        if is_locked and self._area.state.tracking.track in AUTOTRACKING and not self._area.state.encoders.problem:
-            self._area.to_fit.append(reading)
-        if self._on_reading is not None:
-            self._on_reading(reading)
+        self.motion.add(heard.reading)
+        if heard.is_to_fit:
+            area.to_fit.append(heard.reading)
+        if self._on_reading is not None and answer.is_sure:
+            self._on_reading(heard.reading)
 
-    def _report_doubt(self, status: Status) -> None:
+    def _report_doubt(self, status: Status, reason: str) -> None:
         """Say it once a second at most: a bad line garbles often."""
         now_s = self._clock.monotonic_s()
         if now_s >= self._doubt_again_s:
             self._doubt_again_s = now_s + DOUBT_EVERY_S
-            doubt = self._doubt
-            self._log.warning("acu.doubted", reason=doubt.reason, mode=status.mode.name, count=doubt.count)
+            count = self._area.state.plausibility.doubted_count
+            self._log.warning("acu.doubted", reason=reason, mode=status.mode.name, count=count)
 
     def _report(self, events: tuple[Event, ...]) -> None:
         for event in events:
@@ -277,7 +252,6 @@ class Foreground:
 
     async def safe_stop(self) -> bool:
         """Stop the antenna.  True: stopped, or left to somebody else; False: not acknowledged."""
-        clears_watchdog = (
-            self._config.register_watchdog_s > 0.0 and self._area.state.startup.watchdog is not Watchdog.REFUSED
-        )
+        is_there = self._area.state.startup.watchdog is not Watchdog.REFUSED
+        clears_watchdog = self._config.register_watchdog_s > 0.0 and is_there
         return await stop_antenna(self._port, DEADLINE_S, clears_watchdog=clears_watchdog)

@@ -5,7 +5,7 @@ from typing import Any
 
 import structlog
 
-from acu_daemon.control.doubt import Doubt
+from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.port import AcuPort
 
 WINDOW_LOOKS = 5  # seconds
@@ -15,8 +15,8 @@ POOR_COUNT = 3  # bad replies in the window; one now and then is no alarm
 class LineWatch:
     """The alarm, empty while the line is good or down; only its changes are logged."""
 
-    def __init__(self, port: AcuPort, doubt: Doubt) -> None:
-        self._port, self._doubt = port, doubt
+    def __init__(self, port: AcuPort, area: CommonArea) -> None:
+        self._port, self._area = port, area
         self._log: Any = structlog.get_logger("link")
         self._counts: deque[int] = deque(maxlen=WINDOW_LOOKS + 1)
         self._is_poor = False
@@ -30,7 +30,12 @@ class LineWatch:
             self._counts.clear()
             self._is_poor, self.alarm = False, ""
             return
-        counts = (port.failed_exchange_count, port.garbled_count, port.discarded_count, self._doubt.count)
+        counts = (
+            port.failed_exchange_count,
+            port.garbled_count,
+            port.discarded_count,
+            self._area.state.plausibility.doubted_count,
+        )
         self._counts.append(sum(counts))
         bad_count = self._counts[-1] - self._counts[0]
         if bad_count >= POOR_COUNT:

@@ -10,10 +10,9 @@ import structlog
 
 from acu_daemon.control.approach import lead_s
 from acu_daemon.control.arming import begin_run
-from acu_daemon.control.causes import is_tracked, pass_end_tai_s
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.foreign_stop import release
-from acu_daemon.control.plan import plan_pass
+from acu_daemon.control.plan import is_due, is_tracked, plan_pass, why_over
 from acu_daemon.control.refit import RefitSetup
 from acu_daemon.control.state import ControlState, remembered
 from acu_daemon.control.states import ACTIVE
@@ -115,7 +114,6 @@ class Service:
         self._is_over = asyncio.Event()
         self._stop_reason = ""
         self._started_tai_s = math.inf
-        self._planned_turns = 0  # the turns that were learned anew before the plan was made
         self._log: Any = structlog.get_logger("pass")
         self._area = CommonArea(state=begin_run(job.state, job.control))
         self._port = AcuPort(link, clock, job.address, job.control.period_s, job.device_delay_s)
@@ -190,15 +188,13 @@ class Service:
     def _supervise(self, now_tai_s: float) -> None:
         """Look after a tick whether the run is over, and plan the pass as soon as it can be planned."""
         sky = self._area.sky
-        if now_tai_s >= self._job.end_tai_s:
-            self.stop("duration over")
-        elif sky.plan is not None and now_tai_s > pass_end_tai_s(sky.plan, sky):
-            self.stop("pass over")
+        if why := why_over(sky, now_tai_s, self._job.end_tai_s):
+            self.stop(why)
         if self._stop_reason:
             self._is_over.set()
             return
         self._check_acu(now_tai_s - self._started_tai_s)
-        if sky.plan is None or self._area.state.turn.learned_count != self._planned_turns:
+        if is_due(sky.plan, self._area.state):
             self._plan(now_tai_s)
         if self._why_anew is not None and self._foreground.tick_count % LOOK_TICKS == 0:
             self._look_anew(self._why_anew, now_tai_s)
@@ -235,9 +231,6 @@ class Service:
 
     def _plan(self, now_tai_s: float) -> None:
         job, state = self._job, self._area.state
-        if state.intake.status is None:
-            return
-        self._planned_turns = state.turn.learned_count
         axes = job.control
         plan = plan_pass(
             job.refit.propagator,
@@ -247,6 +240,7 @@ class Service:
             axes.azimuth,
             now_tai_s,
             elevation=axes.elevation,
+            learned_count=state.turn.learned_count,
         )
         self._log.info(
             "pass.planned",
