@@ -160,10 +160,9 @@ def to_goal(
     goal_deg: float,
     limits: AxisLimits,
     *,
-    fixed: bool = True,
     scale: float = 1.0,
 ) -> tuple[TurnWatch, bool]:
-    return watch_goal(watch, TICK_S * k, az_deg, goal_deg, limits, scale=scale, is_goal_fixed=fixed)
+    return watch_goal(watch, TICK_S * k, az_deg, goal_deg, limits, scale=scale)
 
 
 @given(
@@ -189,7 +188,7 @@ def test_a_drive_that_does_its_best_is_never_doubted_however_its_goal_runs_and_t
         now_deg_s += min(max(wanted_deg_s - now_deg_s, -most_deg_s), most_deg_s)
         az_deg += now_deg_s * TICK_S
         reading_deg = az_deg + random.gauss(0.0, noise_deg)
-        watch, is_standing = to_goal(watch, k, reading_deg, goal_deg, limits, fixed=False, scale=0.02)
+        watch, is_standing = to_goal(watch, k, reading_deg, goal_deg, limits, scale=0.02)
         assert not is_standing and not watch.problem
 
 

@@ -5,15 +5,19 @@
 STOPPING: STOP until it is acknowledged, no register is written and no mode selected until the antenna stands.  MOVING:
 the other turn is taken for the true one, the start begins anew (the present angles first), and the antenna is moved by
 STEP_DEG away from the stop that is nearer on that turn.  So no step goes towards a stop, whichever turn is true: on the
-old one the same step leads away from it too, or into the wide part of the range.  An azimuth that does not follow even
-then is no matter of turns: the axis watch latches it.  The plan of the pass is made anew for the turn that was learned.
+old one the same step leads away from it too, or into the wide part of the range.  The plan of the pass is made anew for
+the turn that was learned.
+
+An azimuth that does not follow even then, or stands on a turn that is sure, is no matter of turns: it is latched.  The
+axis watch does so, and beside the zenith, where a register's whole lead is little on the sky, the time that goes by
+without a motion (`STANDS`).
 """
 
 from math import inf
 
 from acu_daemon.control.arming import owe_stop
 from acu_daemon.control.axis_latch import forget_motion
-from acu_daemon.control.axis_watch import BRAKING_MARGIN, FAST_MARGIN, Duty, duty_of, sky_scale
+from acu_daemon.control.axis_watch import BRAKING_MARGIN, FAST_MARGIN, Duty, az_ends, duty_of, sky_scale
 from acu_daemon.control.causes import is_acquired
 from acu_daemon.control.changed import changed
 from acu_daemon.control.control_config import ControlConfig
@@ -26,8 +30,10 @@ from acu_daemon.control.state import ControlState, Stage
 from acu_daemon.control.states import ACTIVE, TrackState
 from acu_daemon.control.tick_input import Observation
 from acu_daemon.control.turn import (
+    PATIENCE_S,
     Phase,
     corrected,
+    drive_s,
     half_text,
     is_pulled_round,
     locate,
@@ -35,7 +41,7 @@ from acu_daemon.control.turn import (
     other_turn,
     settled,
     stopping,
-    stopping_since,
+    under_way,
     watch_goal,
     watch_pull,
 )
@@ -45,6 +51,8 @@ from acu_daemon.protocol.messages import AcuMode, Status
 LONGEST_STEP_DEG = 170.0  # between two readings; with more the turn is not known by counting
 STEP_DEG = 5.0
 ARRIVED_DEG = 1.0
+LEAD_DEG = 5.0  # of a command that has taken effect: no lag of a drive, and half of what a register waits at
+STANDS = "azimuth stands still away from its command"
 MOST_LEARNED = 4  # turns in a run
 STANDING_DEG = 0.1  # over the newest readings
 OTHERS_MODES = (AcuMode.MANUAL, AcuMode.STOWING, AcuMode.STOWED, AcuMode.FAULT)
@@ -88,25 +96,33 @@ def doubt(state: ControlState, config: ControlConfig, events: list[Event], why: 
     return owe_stop(release(forget_in_force(forget_motion(state))))
 
 
-def watch_turn(state: ControlState, seen: Observation, config: ControlConfig, events: list[Event]) -> ControlState:
-    """Judge the way to the goal by a new reading, and go on with a turn that is doubted."""
+def watch_turn(
+    state: ControlState, seen: Observation, config: ControlConfig, events: list[Event]
+) -> tuple[ControlState, str]:
+    """Judge the way to the goal by a new reading, and go on with a turn that is doubted.
+
+    Returns what the azimuth does wrong that no turn explains; empty: nothing.
+    """
     status = seen.status
     if status is None or seen.reading is None:
-        return state
+        return state, ""
     is_ours = state.is_armed(config) and not state.latch.problem and state.tracking.track is not TrackState.LINK_LOST
     if not is_ours or not status.is_remote_enabled or status.mode in OTHERS_MODES:
         is_plain = state.turn.phase is Phase.BELIEVED and not state.turn.problem
-        return state if is_plain else _settled(state)
+        return (state if is_plain else _settled(state)), ""
     if state.turn.phase is Phase.STOPPING:
-        return _stopped(state, status, config, events)
+        return _stopped(state, status, config, events), ""
     if state.turn.phase is Phase.MOVING:
-        return _moved(state, status, events)
+        return _moved(state, status, config, events)
+    return _on_its_way(state, status, seen.reading.tai_s, config, events)
+
+
+def _on_its_way(
+    state: ControlState, status: Status, tai_s: float, config: ControlConfig, events: list[Event]
+) -> tuple[ControlState, str]:
     goal_deg = _goal_deg(state, status)
-    tai_s, limits, scale = seen.reading.tai_s, config.azimuth, sky_scale(status.el_deg)
-    az_deg, is_goal_fixed = state.intake.az_deg, state.tracking.track is TrackState.PREPOSITION
-    turn, is_standing = watch_goal(
-        state.turn, tai_s, az_deg, goal_deg, limits, scale=scale, is_goal_fixed=is_goal_fixed
-    )
+    az_deg, limits, scale = state.intake.az_deg, config.azimuth, sky_scale(status.el_deg)
+    turn, is_standing = watch_goal(state.turn, tai_s, az_deg, goal_deg, limits, scale=scale)
     if turn.problem and not state.turn.problem:
         fields = {"az_deg": az_deg, "el_deg": status.el_deg, "goal_deg": goal_deg, "problem": turn.problem}
         events.append(Event("azimuth.late", fields, is_warning=True))
@@ -116,10 +132,25 @@ def watch_turn(state: ControlState, seen: Observation, config: ControlConfig, ev
     )
     state = state if turn is state.turn else changed(state, turn=turn)
     if is_pulled_for_good:
-        return doubt(state, config, events, "the azimuth moves away from its command, as it would on the other turn")
+        why = "the azimuth moves away from its command, as it would on the other turn"
+        return doubt(state, config, events, why), ""
     if is_standing and _may_doubt(state) and other_turn(az_deg, limits) is not None:
-        return doubt(state, config, events, "the azimuth moves no further towards its goal")
-    return state
+        return doubt(state, config, events, "the azimuth moves no further towards its goal"), ""
+    is_stuck = is_standing and is_watched(config) and _is_led(state, status, turn.side)
+    return state, STANDS if is_stuck else ""
+
+
+def is_watched(config: ControlConfig) -> bool:
+    """Whether an axis that does not obey is latched."""
+    return config.following.error_s > 0.0
+
+
+def _is_led(state: ControlState, status: Status, side: int) -> bool:
+    """Whether a command is in force that the azimuth should move by, to this side, and no limit switch holds it."""
+    in_force, (is_at_max, is_at_min) = state.registers.in_force, az_ends(status)
+    if in_force is None or duty_of(status) is not Duty.FOLLOW or (is_at_max if side > 0 else is_at_min):
+        return False
+    return side * (in_force[1] - state.intake.az_deg) > LEAD_DEG
 
 
 def _goal_deg(state: ControlState, status: Status) -> float | None:
@@ -139,7 +170,7 @@ def _stopped(state: ControlState, status: Status, config: ControlConfig, events:
     if state.arming.is_stop_due or duty_of(status) is not Duty.STAND:
         return state
     last_tai_s, limits = state.intake.track_of_readings[-1][0], config.azimuth
-    state = changed(state, turn=stopping_since(state.turn, last_tai_s))
+    state = changed(state, turn=under_way(state.turn, last_tai_s))
     az_deg = [az for _, az, _ in state.intake.track_of_readings]
     moved_deg = max(az_deg) - min(az_deg)
     braking_s = BRAKING_MARGIN * limits.max_rate_deg_s / limits.max_acceleration_deg_s2
@@ -160,19 +191,21 @@ def _stopped(state: ControlState, status: Status, config: ControlConfig, events:
     return changed(state, turn=moving(state.turn, move_to_deg))
 
 
-def _moved(state: ControlState, status: Status, events: list[Event]) -> ControlState:
-    to_deg = state.turn.move_to_deg
-    has_followed = (
-        to_deg is not None
-        and state.startup.stage is Stage.READY
-        and duty_of(status) is Duty.FOLLOW
-        and abs(state.intake.az_deg - to_deg) < ARRIVED_DEG
-    )
+def _moved(state: ControlState, status: Status, config: ControlConfig, events: list[Event]) -> tuple[ControlState, str]:
+    """Whether it follows.  If not in the time that its drive needs: the turn that was believed is, and it is stuck."""
+    to_deg, az_deg, limits = state.turn.move_to_deg, state.intake.az_deg, config.azimuth
+    is_led = to_deg is not None and state.startup.stage is Stage.READY and duty_of(status) is Duty.FOLLOW
+    has_followed = is_led and to_deg is not None and abs(az_deg - to_deg) < ARRIVED_DEG
     if not has_followed and not is_acquired(status):
-        return state
+        tai_s = state.intake.track_of_readings[-1][0]
+        state = changed(state, turn=under_way(state.turn, tai_s)) if is_led else state
+        if tai_s - state.turn.begun_tai_s <= PATIENCE_S + drive_s(2.0 * STEP_DEG, limits) or not is_watched(config):
+            return state, ""
+        believed_deg = other_turn(az_deg, limits)
+        return _settled(on_other_turn(state, (believed_deg or az_deg) - az_deg)), STANDS
     by = "the antenna follows on it" if has_followed else "autotrack holds the satellite"
     events.append(Event("turn.learned", {"az_deg": state.intake.az_deg, "by": by}))
-    return _settled(state, learned_count=1)
+    return _settled(state, learned_count=1), ""
 
 
 def _settled(state: ControlState, learned_count: int = 0) -> ControlState:

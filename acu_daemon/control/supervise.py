@@ -29,7 +29,11 @@ def supervise(
     state = disarm(state, person, events) if person else state
     state, problem = watch_antenna(state, seen, config)
     if problem == AZIMUTH_AWAY and may_be_other_turn(state, config):
-        state = doubt(state, config, events, problem)
-    elif problem:
-        state = forget_lag(owe_stop(latch(state, problem, events)))
-    return watch_turn(owe_no_stop_to_others(state), seen, config, events)
+        state, problem = doubt(state, config, events, problem), ""
+    state = _stop_for(state, problem, events)
+    state, problem = watch_turn(owe_no_stop_to_others(state), seen, config, events)
+    return _stop_for(state, problem, events)
+
+
+def _stop_for(state: ControlState, problem: str, events: list[Event]) -> ControlState:
+    return forget_lag(owe_stop(latch(state, problem, events))) if problem else state

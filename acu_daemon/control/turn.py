@@ -16,6 +16,7 @@ A place that was believed wrongly shows in two ways:
 - the ACU, which knows better, cannot go on past its stop and drives the antenna the long way round: away from its
   command, though no axis is reversed (`is_pulled_round`), and further than it needs to brake (`watch_pull`).
 Either stops the antenna and puts the other turn in the place of the believed one; control.relearn moves it then.
+An azimuth that stands on a turn that is sure, or on either, is no matter of turns: it is latched.
 """
 
 from dataclasses import dataclass
@@ -61,8 +62,8 @@ class TurnWatch:
     phase: Phase = Phase.BELIEVED
     move_to_deg: float | None = None  # while MOVING
     learned_count: int = 0
-    goal_deg: float | None = None
-    way_deg: float = 0.0  # to the goal, at the begin of the move
+    goal_deg: float | None = None  # as it stood when the way to it began
+    way_deg: float = 0.0  # to the goal, at the begin
     begun_tai_s: float = inf
     side: int = 0  # where the goal is, seen from the azimuth: +1, -1; 0: there
     mark_deg: float = 0.0  # where the azimuth was when it last made progress
@@ -113,6 +114,8 @@ def locate(watch: TurnWatch, status: Status, limits: AxisLimits, near_deg: float
 def _judge_bit(watch: TurnWatch, status: Status, az_deg: float, limits: AxisLimits) -> TurnWatch:
     off_deg = az_deg - middle_deg(limits)
     half = int(off_deg >= 0.0)
+    if watch.phase is not Phase.BELIEVED:
+        return watch
     if abs(off_deg) < BIT_MARGIN_DEG or (watch.wrong_half is not None and watch.wrong_half != half):
         return watch
     is_wrong = status.is_sector_high != bool(half)
@@ -172,29 +175,27 @@ def watch_goal(
     limits: AxisLimits,
     *,
     scale: float,
-    is_goal_fixed: bool,
 ) -> tuple[TurnWatch, bool]:
     """Judge one more reading of an azimuth on its way.  Returns whether it stands, or moves away, short of its goal.
 
-    goal_deg: where it shall go in the end, continuous; None: nowhere.  What stands, and what takes longer to a fixed
-    goal than the drive needs, is said in `problem`.  scale: degrees of azimuth on the sky.
+    goal_deg: where it shall go in the end, continuous; None: nowhere.  What stands, and what takes longer than the
+    drive needs to a goal that stands still, is said in `problem`.  scale: degrees of azimuth on the sky.
     """
     gap_deg = inf if goal_deg is None else abs(goal_deg - az_deg)
     if goal_deg is None or gap_deg < GOAL_DEG:
         return (at_rest(watch) if watch.goal_deg is not None or watch.problem else watch), False
     side = 1 if goal_deg > az_deg else -1
-    if watch.goal_deg is None or side != watch.side or abs(goal_deg - watch.goal_deg) > 90.0:
-        watch = changed(
-            at_rest(watch), way_deg=gap_deg, begun_tai_s=tai_s, side=side, mark_deg=az_deg, mark_tai_s=tai_s
-        )
+    if watch.goal_deg is None or side != watch.side:
+        watch = changed(at_rest(watch), side=side, mark_deg=az_deg, mark_tai_s=tai_s)
+    if watch.goal_deg is None or abs(goal_deg - watch.goal_deg) > NEARER_DEG:
+        watch = changed(watch, goal_deg=goal_deg, way_deg=gap_deg, begun_tai_s=tai_s)
     moved_deg = side * (az_deg - watch.mark_deg)
     if moved_deg > NEARER_DEG:
         watch = changed(watch, mark_deg=az_deg, mark_tai_s=tai_s)
     elif moved_deg < -GOAL_DEG - 2.0 * NOISE_DEG / scale:  # it brakes: from where it turns round it shall come on
         watch = changed(watch, mark_deg=az_deg)
-    watch = changed(watch, goal_deg=goal_deg)
     is_standing = tai_s - watch.mark_tai_s > PATIENCE_S + drive_s(STEP_DEG, limits)
-    is_late = is_goal_fixed and tai_s - watch.begun_tai_s > PATIENCE_S + drive_s(watch.way_deg, limits)
+    is_late = tai_s - watch.begun_tai_s > PATIENCE_S + drive_s(watch.way_deg, limits)
     if not (is_standing or is_late) or watch.problem:
         return watch, is_standing
     turn = "" if is_one_turn(limits) else f", {half_text(az_deg, limits)}"
@@ -218,14 +219,14 @@ def stopping(watch: TurnWatch, problem: str) -> TurnWatch:
     return changed(at_rest(watch), phase=Phase.STOPPING, move_to_deg=None, is_sure=False, problem=problem)
 
 
-def stopping_since(watch: TurnWatch, tai_s: float) -> TurnWatch:
-    """Note when the antenna was seen in a mode that stops it, first."""
+def under_way(watch: TurnWatch, tai_s: float) -> TurnWatch:
+    """Note when the antenna was seen first in a mode that stops it, or moves it."""
     return changed(watch, begun_tai_s=min(watch.begun_tai_s, tai_s))
 
 
 def moving(watch: TurnWatch, to_deg: float) -> TurnWatch:
     """The antenna is moved by a few degrees on the other turn."""
-    return changed(watch, phase=Phase.MOVING, move_to_deg=to_deg)
+    return changed(watch, phase=Phase.MOVING, move_to_deg=to_deg, begun_tai_s=inf)
 
 
 def settled(watch: TurnWatch, learned_count: int = 0) -> TurnWatch:
