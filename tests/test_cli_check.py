@@ -123,6 +123,7 @@ def test_when_all_is_well_every_line_is_go_and_the_status_0(tmp_path: Path) -> N
         ("station.toml", "GO"),
         ("place", "GO"),
         ("clock", "GO"),
+        ("leap seconds", "GO"),
         ("scd: elements", "GO"),
         ("scd: next pass", "GO"),
         ("scd: cable wrap", "GO"),

@@ -207,7 +207,7 @@ def test_the_child_is_nice_however_its_parent_is(daemons: int, childs: int) -> N
 
 def test_what_a_library_prints_in_the_child_is_no_reply() -> None:
     code = "import acu_daemon.edge.fit_child as c; import acu_daemon.control.refit as r; r.Refitter = print; c.serve()"
-    greeting = pickle.dumps("a library says hello")
+    greeting = pickle.dumps(((), "a library says hello"))
     done = subprocess.run(
         [sys.executable, "-c", code], input=LENGTH.pack(len(greeting)) + greeting, capture_output=True, check=False
     )

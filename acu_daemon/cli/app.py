@@ -15,6 +15,7 @@ import typer
 
 from acu_daemon import __version__
 from acu_daemon.edge.denied import denied
+from acu_daemon.edge.leap_seconds_file import adopt_system_leap_seconds
 from acu_daemon.errors import AcuDaemonError, NoAcuError, UsageError
 
 EXIT_FAILED, EXIT_USAGE, EXIT_NO_ACU, EXIT_INTERNAL = 1, 2, 3, 4
@@ -153,6 +154,7 @@ def main() -> None:
     try:
         try:
             app = make_app(sys.argv[1:])
+            adopt_system_leap_seconds()
             gc.freeze()  # what was loaded stays: no collection has to look at it again
             gc.enable()
             app()

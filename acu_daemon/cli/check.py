@@ -35,7 +35,9 @@ from acu_daemon.daemon.port import AcuPort
 from acu_daemon.daemon.verdict import Level, alarms, verdict
 from acu_daemon.edge.clock import SystemClock, is_clock_synchronised, system_tai_s
 from acu_daemon.edge.clock_sense import before_elements, before_release
+from acu_daemon.edge.earth_orientation_file import at_date
 from acu_daemon.edge.latch import ADVICE, DISARMED, LATCH
+from acu_daemon.edge.leap_seconds_file import leap_seconds_told
 from acu_daemon.edge.link import check_rate, make_link
 from acu_daemon.edge.loop import run_loop
 from acu_daemon.edge.state import SNAPSHOT, choice_text, folders_in, older_folders, state_path, with_choice
@@ -102,7 +104,7 @@ def command(
 
 def _findings(config: Path, satellite: str | None, now_tai_s: float, state: Path | None) -> Iterator[Finding]:
     try:
-        station = load_station(config)
+        station, earth = at_date(load_station(config), config, now_tai_s)
     except UsageError as error:
         yield Finding(NO_GO, "station.toml", str(error))
         return
@@ -112,6 +114,11 @@ def _findings(config: Path, satellite: str | None, now_tai_s: float, state: Path
         yield Finding(WARN, "arming", '[safety] arm = "manual": the daemon writes nothing until a person arms it')
     yield from _left_behind(config, station, state)
     yield clock_finding()
+    told, is_to_be_seen_to = leap_seconds_told(now_tai_s)
+    yield Finding(WARN if is_to_be_seen_to else GO, "leap seconds", told)
+    if earth.about or earth.warning:
+        said = "; ".join(text for text in (earth.about, earth.warning) if text)
+        yield Finding(WARN if earth.warning else GO, "Earth orientation", said)
     names = [satellite] if satellite else satellite_names(config)
     if not names:
         yield Finding(NO_GO, "satellites", f"{config}/satellites holds no satellite; put a NAME.toml there")

@@ -1,7 +1,7 @@
 """Options that several commands share, and what they are turned into."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
@@ -13,11 +13,12 @@ from acu_daemon.config import load_satellite, load_station
 from acu_daemon.config_tables import SatelliteFile, StationFile
 from acu_daemon.control.approach import longest_lead_s
 from acu_daemon.edge.clock import SystemClock
+from acu_daemon.edge.earth_orientation_file import EarthUsed, at_date
 from acu_daemon.edge.elements_file import LoadedElements, load_elements
 from acu_daemon.edge.recording_whose import ElementsUsed, Whose
 from acu_daemon.edge.state import Antenna, refuse_world_writable
 from acu_daemon.errors import ElementsError, UsageError
-from acu_daemon.model import Pass
+from acu_daemon.model import EarthOrientation, Pass
 from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.propagator import spans_tai_s
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator
@@ -89,9 +90,10 @@ def check_duration(duration_s: float | None) -> None:
 class Target:
     """A satellite over a station: files read, elements chosen."""
 
-    station: StationFile
+    station: StationFile  # with the Earth orientation of the date in it, where it names a file of that
     satellite: SatelliteFile
     elements: LoadedElements
+    earth: EarthUsed = EarthUsed(EarthOrientation())
 
 
 def whose_recording(target: Target, *, is_rehearsal: bool) -> Whose:
@@ -111,13 +113,15 @@ def load_target(
     """
     for path in (config, config / "satellites", config / "station.toml", config / "satellites" / f"{name}.toml"):
         refuse_world_writable(path)
-    base = load_station(config)
+    base, earth = at_date(load_station(config), config, now_tai_s if at_tai_s is None else at_tai_s)
     satellite, station = load_satellite(config, name, base)
     path = config / "satellites" / f"{name}.toml"
     elements = load_elements(satellite, path, now_tai_s, station.site.orientation, at_tai_s)
     if is_strict and elements.errors:
         raise ElementsError("\n".join(elements.errors))
-    return Target(station, satellite, elements)
+    if earth.warning:
+        elements = replace(elements, warnings=[*elements.warnings, earth.warning])
+    return Target(station, satellite, elements, earth)
 
 
 def nearest_to_pass(config: Path, name: str, target: Target, now_tai_s: float, *, is_strict: bool = True) -> Target:

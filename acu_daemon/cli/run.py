@@ -289,6 +289,8 @@ def _announce(target: Target, coming: Pass, clock: SystemClock, *, is_shadow: bo
     )
     for warning in target.elements.warnings:
         log.warning("elements.warning", reason=warning)
+    if target.earth.about:
+        log.info("earth.orientation", age=target.earth.about)
     if target.elements.choice:
         log.info("elements.chosen", reason=target.elements.choice)
     if until := ending(target, coming.set_tai_s + DAY_S):

@@ -18,6 +18,7 @@ from acu_daemon.edge.child_process import start_python
 from acu_daemon.edge.fit_child import LENGTH
 from acu_daemon.errors import AcuDaemonError
 from acu_daemon.model import Readings
+from acu_daemon.orbit.timescales import leap_dates
 
 START_S = 20.0  # a child that starts may take this much longer: niced, on a busy machine, it loads numpy first
 END_S = 1.0  # a child that has closed its pipe has ended, or will within this
@@ -116,7 +117,7 @@ class ProcessFitRunner:
         self._said.clear()
         self._hearing = asyncio.create_task(self._hear(self._child), name="fit process said")
         self.start_count += 1
-        await self._send(self._setup)
+        await self._send((leap_dates(), self._setup))
 
     async def _hear(self, child: asyncio.subprocess.Process) -> None:
         """Take what the child says on standard error to the log, the first lines of it."""

@@ -49,10 +49,13 @@ def serve() -> None:
     import numpy as np
 
     from acu_daemon.control.refit import Refitter
+    from acu_daemon.orbit.timescales import adopt_leap_dates
 
     gc.freeze()
     gc.enable()
-    refitter = Refitter(_receive())
+    dates, setup = _receive()
+    adopt_leap_dates(dates)  # the daemon's, whatever the system's list has become meanwhile
+    refitter = Refitter(setup)
     while True:
         request: RefitRequest = _receive()
         reply: RefitReply | str

@@ -47,13 +47,20 @@ def adopt_leap_dates(dates: Sequence[date]) -> None:
     dates: as LEAP_DATES, and the later ones that a leap-seconds.list has (acu_daemon.orbit.leap_seconds).  What a
     process has read before would keep the old leap seconds, and each process adopts them for itself.
     """
-    global _STEPS_UTC_S, _STEPS_TAI_S, _STEPS_TAI_ARRAY, _LEAP_SECONDS_TAI_S
+    global _DATES, _STEPS_UTC_S, _STEPS_TAI_S, _STEPS_TAI_ARRAY, _LEAP_SECONDS_TAI_S
+    _DATES = tuple(dates)
     _STEPS_UTC_S = [_midnight_s(day) for day in dates]
     _STEPS_TAI_S = [utc_s + 10 + i for i, utc_s in enumerate(_STEPS_UTC_S)]
     _STEPS_TAI_ARRAY = np.array(_STEPS_TAI_S, dtype=np.float64)
     _LEAP_SECONDS_TAI_S = frozenset(tai_s - 1 for tai_s in _STEPS_TAI_S[1:])
 
 
+def leap_dates() -> tuple[date, ...]:
+    """Give those in force, for another process to adopt."""
+    return _DATES
+
+
+_DATES: tuple[date, ...]
 _STEPS_UTC_S: list[int]
 _STEPS_TAI_S: list[int]
 _STEPS_TAI_ARRAY: Array
