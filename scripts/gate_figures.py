@@ -33,8 +33,8 @@ from acu_daemon.assist.reading_gate import (
     Dwell,
     locked_readings,
 )
+from acu_daemon.assist.session.refit import RefitRequest, RefitSetup, Refitter
 from acu_daemon.assist.settings import EstimatorSettings
-from acu_daemon.control.refit import RefitRequest, RefitSetup, Refitter
 from acu_daemon.model import AxisLimits, FitResult, Reading, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.sim.sky import DirectionTable, read_truth

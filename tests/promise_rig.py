@@ -21,10 +21,10 @@ from promise_judge import Judge
 import acu_daemon.edge.carry_over as carry_over_file
 import acu_daemon.edge.clock as clock_file
 import acu_daemon.edge.run_state as run_state_file
+from acu_daemon.assist.session.refit import RefitReply, RefitRequest, RefitSetup
 from acu_daemon.cli.kept import open_kept
 from acu_daemon.cli.options import Target, coming_pass
 from acu_daemon.cli.run import make_job
-from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup
 from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.edge.clock import LoopClock, SystemClock

@@ -29,8 +29,8 @@ from acu_daemon.assist.estimators.full.estimated_states import BIAS, ORBIT, Prio
 from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
 from acu_daemon.assist.estimators.full.normal_points import sights
 from acu_daemon.assist.mount_model import encoder_look
+from acu_daemon.assist.session.refit import RefitRequest, RefitSetup, Refitter
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings
-from acu_daemon.control.refit import RefitRequest, RefitSetup, Refitter
 from acu_daemon.edge.fit import InlineFitRunner
 from acu_daemon.model import AngleBias, AxisLimits, Correction, FitResult, Readings, Site
 from acu_daemon.orbit.brouwer import BrouwerPropagator

@@ -14,8 +14,8 @@ from conftest import DATA, needs_data
 from real_passes import RealPass, noisy, sky_angles_deg
 
 from acu_daemon.assist.estimators.estimator import ESTIMATORS
-from acu_daemon.control.comparison import compare
-from acu_daemon.control.replay import Replayed
+from acu_daemon.assist.session.estimator_comparison import compare
+from acu_daemon.assist.session.replay_readings import Replayed
 from acu_daemon.control.states import TrackState
 from acu_daemon.edge.recording import RecordingWriter
 from acu_daemon.edge.recording_whose import ElementsUsed, Whose, save_whose
@@ -285,7 +285,7 @@ def test_the_whole_pass_is_compared_with_its_losses_and_the_gaps_of_a_stopped_da
         (float(t), Reading(float(t), 10.0, 20.0, is_locked=not 4 <= t < 8)) for t in range(12)
     ]
     lines += [(60.0 + t, Reading(60.0 + t, 10.0, 20.0, is_locked=True)) for t in range(3)]
-    results = [Replayed(10.0, 20.0, None, TrackState.AUTOTRACK_FITTED) for _ in lines]
+    results = [Replayed(10.0, 20.0, None, True, True, True) for _ in lines]
     seen = compare(lines, {"full": results}, 1.0)
     assert seen.losses_tai_s == [(4.0, 8.0)]
     assert seen.gaps_tai_s == [(11.0, 60.0)]

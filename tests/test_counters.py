@@ -15,8 +15,8 @@ from test_writer import PATIENT_S, stuck
 
 from acu_daemon.assist.estimators.kalman import Estimate, FilterState, linearise, sweep
 from acu_daemon.assist.reading_gate import OUTLIER
+from acu_daemon.assist.session.refit import RefitReply, RefitRequest
 from acu_daemon.assist.settings import EstimatorSettings
-from acu_daemon.control.refit import RefitReply, RefitRequest
 from acu_daemon.edge import recording as recording_file
 from acu_daemon.edge.arrivals import MAX_WAITING_BYTES, Arrivals
 from acu_daemon.edge.fit import FitDiedError, FitFailedError, InlineFitRunner

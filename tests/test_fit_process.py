@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from acu_daemon.assist.estimators.estimator import ESTIMATORS, EstimatorSettings
-from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup
+from acu_daemon.assist.session.refit import RefitReply, RefitRequest, RefitSetup
 from acu_daemon.edge.fit import FitFailedError, InlineFitRunner, ProcessFitRunner
 from acu_daemon.edge.fit_child import LENGTH
 from acu_daemon.model import AxisLimits, Correction, Readings
@@ -206,7 +206,10 @@ def test_the_child_is_nice_however_its_parent_is(daemons: int, childs: int) -> N
 
 
 def test_what_a_library_prints_in_the_child_is_no_reply() -> None:
-    code = "import acu_daemon.edge.fit_child as c; import acu_daemon.control.refit as r; r.Refitter = print; c.serve()"
+    code = (
+        "import acu_daemon.edge.fit_child as c; import acu_daemon.assist.session.refit as r; "
+        "r.Refitter = print; c.serve()"
+    )
     greeting = pickle.dumps(((), "a library says hello"))
     done = subprocess.run(
         [sys.executable, "-c", code], input=LENGTH.pack(len(greeting)) + greeting, capture_output=True, check=False
@@ -225,5 +228,5 @@ def test_the_child_is_nice_before_it_loads_what_takes_long() -> None:
 
 
 def test_the_child_loads_only_what_a_fit_needs() -> None:
-    loaded = loaded_by("acu_daemon.edge.fit_child") | loaded_by("acu_daemon.control.refit")
+    loaded = loaded_by("acu_daemon.edge.fit_child") | loaded_by("acu_daemon.assist.session.refit")
     assert not loaded & {"asyncio", "structlog", "rich", "pydantic", "typer", "serial", "matplotlib"}

@@ -23,8 +23,8 @@ from acu_daemon.assist.estimators.full.path_partials import (
 from acu_daemon.assist.mount_model import encoder_look, sigma_deg, sky_covariance
 from acu_daemon.assist.reading_gate import ABOVE_MAX_ELEVATION
 from acu_daemon.assist.session.prediction import predict
+from acu_daemon.assist.session.refit import RefitRequest, RefitSetup, Refitter
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings, StateSigmas
-from acu_daemon.control.refit import RefitRequest, RefitSetup, Refitter
 from acu_daemon.model import AngleBias, AxisLimits, Correction, Readings
 from acu_daemon.orbit.frames import itrs_from_teme
 from acu_daemon.orbit.kepler import osculating_from_state

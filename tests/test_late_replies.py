@@ -11,8 +11,8 @@ from flights import RISING_TAI_S, climb, events_named, seconds_to_state, state_a
 from hypothesis import given
 from hypothesis import strategies as st
 
+from acu_daemon.assist.session.refit import RefitReply, RefitRequest
 from acu_daemon.cli.virtual_pass import Flight
-from acu_daemon.control.refit import RefitReply, RefitRequest
 from acu_daemon.daemon.port import AcuPort, Answer
 from acu_daemon.edge.arrivals import Arrivals
 from acu_daemon.edge.clock import LoopClock

@@ -9,8 +9,8 @@ from made_orbits import circular, site, visible
 from acu_daemon.assist.estimators.full.carry_over import CarryOver, carry_over_of
 from acu_daemon.assist.reading_gate import BELIED, WRONG_TARGET
 from acu_daemon.assist.session.model_choice import ModelChoice, choose, newest_residual_deg
+from acu_daemon.assist.session.refit import CARRIED_S, DROPPED, RefitReply, RefitRequest, RefitSetup, Refitter
 from acu_daemon.assist.settings import EstimatorSettings
-from acu_daemon.control.refit import CARRIED_S, DROPPED, RefitReply, RefitRequest, RefitSetup, Refitter
 from acu_daemon.model import AxisLimits, Correction, FitResult, Model, Readings
 from acu_daemon.orbit.look import look_at
 

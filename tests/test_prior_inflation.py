@@ -13,8 +13,8 @@ from acu_daemon.assist.estimators.full.estimated_states import make_prior
 from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
 from acu_daemon.assist.estimators.full.prior_inflation import WIDTHS
 from acu_daemon.assist.mount_model import encoder_look, sigma_deg
+from acu_daemon.assist.session.refit import RefitRequest, RefitSetup, Refitter
 from acu_daemon.assist.settings import BROUWER_SIGMAS, OEM_SIGMAS, ElementSigmas, EstimatorSettings, StateSigmas
-from acu_daemon.control.refit import RefitRequest, RefitSetup, Refitter
 from acu_daemon.model import AngleBias, AxisLimits, Correction, FitResult, Readings
 from acu_daemon.orbit.look import look_at
 from acu_daemon.units import DAY_S

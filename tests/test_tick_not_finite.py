@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from memories import remembering
 from test_tick import CONFIG, FITTED, NOW, PLAN, ready, saw, status
 
+from acu_daemon.assist.session.refit import RefitReply, RefitRequest
 from acu_daemon.control.orders import Orders
-from acu_daemon.control.refit import RefitReply, RefitRequest
 from acu_daemon.control.state import ControlState, PathOffset, Stage
 from acu_daemon.control.states import TrackState
 from acu_daemon.control.tick import tick

@@ -126,7 +126,7 @@ def test_the_fit_process_takes_the_leap_seconds_of_the_daemon() -> None:
     code = (
         "import io, pickle, struct, sys\n"
         "from datetime import date\n"
-        "import acu_daemon.edge.fit_child as child, acu_daemon.control.refit as refit\n"
+        "import acu_daemon.edge.fit_child as child, acu_daemon.assist.session.refit as refit\n"
         "from acu_daemon.orbit.timescales import leap_dates\n"
         "refit.Refitter = lambda setup: print(setup, len(leap_dates()), leap_dates()[-1], file=sys.stderr)\n"
         "child.serve()"

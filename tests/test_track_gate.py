@@ -19,8 +19,8 @@ from acu_daemon.assist.reading_gate import (
     TOO_FAST,
     WRONG_TARGET,
 )
+from acu_daemon.assist.session.refit import RefitReply, RefitRequest, RefitSetup, Refitter
 from acu_daemon.assist.settings import EstimatorSettings
-from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup, Refitter
 from acu_daemon.model import AxisLimits, Correction, Readings
 from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator

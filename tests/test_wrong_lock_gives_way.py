@@ -7,8 +7,8 @@ import pytest
 from made_orbits import circular, site, visible
 from real_passes import noisy
 
+from acu_daemon.assist.session.refit import RefitRequest, RefitSetup, Refitter
 from acu_daemon.assist.settings import EstimatorSettings
-from acu_daemon.control.refit import RefitRequest, RefitSetup, Refitter
 from acu_daemon.model import AxisLimits, Correction, Readings
 from acu_daemon.orbit.look import look_at
 

@@ -10,12 +10,11 @@ import numpy as np
 import typer
 
 from acu_daemon.assist.reading_gate import Dwell
+from acu_daemon.assist.session.refit import RefitSetup
 from acu_daemon.cli.groundtrack_elements import AsJson, Csv, CycleText, Plot, parsed_cycle, write_csv
 from acu_daemon.cli.options import Config, Satellite, load_target
 from acu_daemon.cli.outputs import refuse_no_picture, refuse_unwritable
 from acu_daemon.config import estimator_settings
-from acu_daemon.control.ground_track import SeenPass, seen_pass
-from acu_daemon.control.refit import RefitSetup
 from acu_daemon.edge.campaign import progress_bar
 from acu_daemon.edge.flux_file import load_flux
 from acu_daemon.edge.recording import read_readings
@@ -25,6 +24,7 @@ from acu_daemon.groundtrack.history import History, history_of
 from acu_daemon.groundtrack.kinks import FoundManoeuvre, find_manoeuvres
 from acu_daemon.groundtrack.lunisolar import sun
 from acu_daemon.groundtrack.outlook import Outlook, outlook
+from acu_daemon.groundtrack.seen_pass import SeenPass, seen_pass
 from acu_daemon.model import Reading, Readings
 from acu_daemon.orbit.timescales import gmst_rad, utc_text
 from acu_daemon.units import DAY_S

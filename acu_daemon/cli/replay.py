@@ -10,12 +10,13 @@ from typing import Annotated
 import typer
 
 from acu_daemon.assist.estimators.estimator import ESTIMATORS
+from acu_daemon.assist.session.estimator_comparison import compare, what_is_left_out, why_not_this_satellite
+from acu_daemon.assist.session.refit import RefitSetup
+from acu_daemon.assist.session.replay_readings import BUFFER_S, Replayed, replay
 from acu_daemon.cli.options import SPARE_S, Config, Satellite, Target, lacking, load_target, whose_recording
 from acu_daemon.cli.outputs import refuse_unwritable
 from acu_daemon.config import estimator_settings
-from acu_daemon.control.comparison import compare, what_is_left_out, why_not_this_satellite
-from acu_daemon.control.refit import RefitSetup
-from acu_daemon.control.replay import BUFFER_S, Replayed, replay
+from acu_daemon.control.states import TrackState
 from acu_daemon.edge.recording import read_readings
 from acu_daemon.edge.recording_whose import read_whose
 from acu_daemon.errors import UsageError
@@ -159,7 +160,16 @@ def _compare(job: _Job, results: dict[str, list[Replayed]], seconds: dict[str, f
 def _row(utc: str, result: Replayed) -> str:
     sigma = "" if result.sigma_deg is None else f"{result.sigma_deg:.5f}"
     az = f"{result.az_deg:.5f}"
-    return f"{utc},{'0.00000' if az == '360.00000' else az},{result.el_deg:.5f},{sigma},{result.source}"
+    return f"{utc},{'0.00000' if az == '360.00000' else az},{result.el_deg:.5f},{sigma},{state_of(result)}"
+
+
+def state_of(result: Replayed) -> TrackState:
+    """The state in which the daemon would have been, from the signal and the fit."""
+    if result.is_acquired:
+        return TrackState.AUTOTRACK_FITTED if result.is_fitted else TrackState.AUTOTRACK_TLE
+    if result.has_acquired:
+        return TrackState.HOLD_FITTED if result.is_fitted else TrackState.HOLD_TLE
+    return TrackState.ACQUIRE_TLE
 
 
 def _progress(name: str, total: int) -> Callable[[int], None]:

@@ -18,6 +18,7 @@ import typer
 
 from acu_daemon import PROCESS_START_S
 from acu_daemon.assist.estimators.full.carry_over import CarryOver
+from acu_daemon.assist.session.refit import RefitSetup
 from acu_daemon.cli.clock_wait import wait_for_clock
 from acu_daemon.cli.elements_watch import ElementsWatch
 from acu_daemon.cli.kept import Kept, open_kept
@@ -37,7 +38,6 @@ from acu_daemon.cli.options import (
 )
 from acu_daemon.cli.rehearsal import clock_text, meet_in_rehearsal, met_by_chance
 from acu_daemon.config import control_config, estimator_settings, load_station
-from acu_daemon.control.refit import RefitSetup
 from acu_daemon.control.state import ControlState
 from acu_daemon.daemon.background import fit_deadline_s
 from acu_daemon.daemon.health import Health

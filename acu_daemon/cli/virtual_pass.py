@@ -11,10 +11,10 @@ from typing import Any
 
 import structlog
 
+from acu_daemon.assist.session.refit import RefitSetup
 from acu_daemon.cli.options import Target, coming_pass
 from acu_daemon.cli.run import make_job
 from acu_daemon.cli.simulated import station_air
-from acu_daemon.control.refit import RefitSetup
 from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.edge.clock import LoopClock

@@ -1,1 +1,1 @@
-"""The decision of every tick: state machine, lag, safety gate, replay.  Pure."""
+"""The decision of every tick: state machine, lag, safety gate.  Pure."""

@@ -4,7 +4,7 @@ from collections import deque
 from dataclasses import dataclass, field
 
 from acu_daemon.assist.reading_gate import DWELL, OUT_OF_STEP
-from acu_daemon.control.refit import GateVerdict
+from acu_daemon.assist.session.refit import GateVerdict
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick_input import Sky
 from acu_daemon.model import Model, Reading, Readings

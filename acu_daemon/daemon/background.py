@@ -9,11 +9,11 @@ from typing import Any
 import structlog
 
 from acu_daemon.assist.reading_gate import ABOVE_MAX_ELEVATION
+from acu_daemon.assist.session.refit import GateVerdict, RefitReply, RefitRequest, RefitSetup, before_fit, predict_from
 from acu_daemon.control.approach import lead_s
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.finite import is_fit
 from acu_daemon.control.path_offset import resume_pass
-from acu_daemon.control.refit import GateVerdict, RefitReply, RefitRequest, RefitSetup, before_fit, predict_from
 from acu_daemon.control.states import ACTIVE, AUTOTRACKING, HOLDING, TrackState
 from acu_daemon.control.tick_input import PassPlan
 from acu_daemon.control.track_frame import extents

@@ -8,12 +8,12 @@ from typing import Any
 
 import structlog
 
+from acu_daemon.assist.session.refit import RefitSetup
 from acu_daemon.control.approach import lead_s
 from acu_daemon.control.arming import begin_run
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.foreign_stop import release
 from acu_daemon.control.plan import is_due, is_tracked, plan_pass, why_over
-from acu_daemon.control.refit import RefitSetup
 from acu_daemon.control.state import ControlState, remembered
 from acu_daemon.control.states import ACTIVE
 from acu_daemon.daemon.area import CommonArea

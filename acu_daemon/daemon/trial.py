@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from acu_daemon.control.refit import RefitRequest
+from acu_daemon.assist.session.refit import RefitRequest
 from acu_daemon.daemon.background import REFIT_PERIOD_S
 from acu_daemon.daemon.lateness import Lateness
 from acu_daemon.daemon.port import AcuPort

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import structlog
 
-from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup, Refitter
+from acu_daemon.assist.session.refit import RefitReply, RefitRequest, RefitSetup, Refitter
 from acu_daemon.edge.child_process import start_python
 from acu_daemon.edge.fit_child import LENGTH
 from acu_daemon.errors import AcuDaemonError

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from acu_daemon.errors import OrbitError
 
 if TYPE_CHECKING:
-    from acu_daemon.control.refit import RefitReply, RefitRequest
+    from acu_daemon.assist.session.refit import RefitReply, RefitRequest
 
 LENGTH = struct.Struct("<Q")
 NICENESS = 10  # more than the daemon's, and at least this where that one's is negative
@@ -48,7 +48,7 @@ def serve() -> None:
     gc.disable()  # what is loaded is no garbage
     import numpy as np
 
-    from acu_daemon.control.refit import Refitter
+    from acu_daemon.assist.session.refit import Refitter
     from acu_daemon.orbit.timescales import adopt_leap_dates
 
     gc.freeze()

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.dates import DateFormatter, date2num
 from matplotlib.figure import Figure
 
-from acu_daemon.control.comparison import Comparison, Errors, what_is_left_out
+from acu_daemon.assist.session.estimator_comparison import Comparison, Errors, what_is_left_out
 from acu_daemon.model import FitResult
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.units import Array

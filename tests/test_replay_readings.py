@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from real_passes import noisy, sky_angles_deg
 
 from acu_daemon.assist.estimators.estimator import ESTIMATORS, EstimatorSettings
-from acu_daemon.control.refit import RefitRequest, RefitSetup, Refitter
-from acu_daemon.control.replay import Replayed, replay
+from acu_daemon.assist.session.refit import RefitRequest, RefitSetup, Refitter
+from acu_daemon.assist.session.replay_readings import Replayed, replay
+from acu_daemon.cli.replay import state_of
 from acu_daemon.control.states import TrackState
 from acu_daemon.model import AxisLimits, Correction, Reading, Site, Station
 from acu_daemon.orbit.brouwer import BrouwerElements, BrouwerPropagator
@@ -85,7 +86,7 @@ def test_a_real_pass_locked_for_its_first_part_is_predicted_for_the_rest(name: s
     locked = np.arange(tai_s.size) < 0.6 * tai_s.size
     results = run(setup(Sgp4Propagator(elements), real.site), lines_of(tai_s, seen.az_deg, seen.el_deg, locked))
     assert errors_deg(results, *sky)[~locked].max() < ALLOWED_DEG
-    assert {one.source for one, was_locked in zip(results, locked, strict=True) if not was_locked} == {
+    assert {state_of(one) for one, was_locked in zip(results, locked, strict=True) if not was_locked} == {
         TrackState.HOLD_FITTED
     }
 
@@ -121,7 +122,7 @@ def test_before_the_first_fit_the_prediction_is_the_elements_own() -> None:
     results = run(setup(source, site), lines)
     bare = look_at(source, tai_s, site)
     assert errors_deg(results, bare.az_deg, bare.el_deg).max() < 1e-4
-    assert {one.source for one in results} == {TrackState.ACQUIRE_TLE}
+    assert {state_of(one) for one in results} == {TrackState.ACQUIRE_TLE}
     assert all(one.sigma_deg is None for one in results)
 
 
@@ -132,7 +133,7 @@ def test_the_source_is_the_state_the_daemon_would_have_been_in() -> None:
         (time, replace(reading, is_locked=bool(flag)) if reading else None)
         for (time, reading), flag in zip(MADE_LINES, flags, strict=False)
     ]
-    assert [str(one.source) for one in run(setup(source, site), lines)] == [
+    assert [str(state_of(one)) for one in run(setup(source, site), lines)] == [
         *("ACQUIRE/TLE", "ACQUIRE/TLE"),
         *("AUTOTRACK/TLE", "AUTOTRACK/TLE", "AUTOTRACK/FITTED"),
         *("HOLD/FITTED", "HOLD/FITTED", "AUTOTRACK/FITTED", "HOLD/FITTED"),
@@ -142,7 +143,7 @@ def test_the_source_is_the_state_the_daemon_would_have_been_in() -> None:
 def test_a_loss_before_any_fit_is_held_on_the_elements() -> None:
     source, site, _ = MADE
     (first, reading), (second, _), *_ = MADE_LINES
-    assert [str(one.source) for one in run(setup(source, site), [(first, reading), (second, None)])] == [
+    assert [str(state_of(one)) for one in run(setup(source, site), [(first, reading), (second, None)])] == [
         "AUTOTRACK/TLE",
         "HOLD/TLE",
     ]

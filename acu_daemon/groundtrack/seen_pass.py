@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from acu_daemon.assist.estimators.full.estimated_states import ORBIT, STEPS, correction_of
-from acu_daemon.control.refit import RefitRequest, RefitSetup, Refitter
+from acu_daemon.assist.session.refit import RefitRequest, RefitSetup, Refitter
 from acu_daemon.groundtrack.elements import mean_of
 from acu_daemon.groundtrack.history import Crossing, MeanOrbit, crossing_near
 from acu_daemon.model import FitResult, Readings

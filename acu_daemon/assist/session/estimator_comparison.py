@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from acu_daemon.assist.reading_gate import Dwell
-from acu_daemon.control.replay import Replayed
+from acu_daemon.assist.session.replay_readings import Replayed
 from acu_daemon.model import FitResult, Reading, sky_angle_deg
 from acu_daemon.units import Array
 

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from acu_daemon.control.comparison import Comparison, compare
-from acu_daemon.control.replay import Replayed
-from acu_daemon.control.states import TrackState
+from acu_daemon.assist.session.estimator_comparison import Comparison, compare
+from acu_daemon.assist.session.replay_readings import Replayed
 from acu_daemon.model import Correction, FitResult, Reading
 from acu_daemon.report.comparison import table, what_is_compared
 
@@ -26,7 +25,9 @@ def predicted(count: int, first_fit: int, off_deg: float) -> list[Replayed]:
             100.0,
             30.0 + off_deg,
             None,
-            TrackState.HOLD_FITTED,
+            True,
+            False,
+            True,
             *((FIT, {"side lobe": 1, "off the predicted path": 3}) if k >= first_fit else ()),
         )
         for k in range(count)

@@ -1,4 +1,4 @@
-"""Recorded readings through the same fit and prediction as the daemon's (design section 8, `replay`).  Pure."""
+"""Recorded readings through the same fit and prediction as the daemon's.  Pure."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from acu_daemon.assist.reading_gate import DWELL, Dwell
-from acu_daemon.control.refit import RefitReply, RefitRequest, RefitSetup, Refitter
-from acu_daemon.control.states import TrackState
+from acu_daemon.assist.session.refit import RefitReply, RefitRequest, RefitSetup, Refitter
 from acu_daemon.model import FitResult, Reading, Readings
 
 BUFFER_S = 2.0  # after its end, and with new readings, a fresh one is made
@@ -18,13 +17,17 @@ REFIT_PERIOD_S = 0.5  # at any rate of readings, a refit then comes at least onc
 class Replayed:
     """What the daemon would have predicted for an instant: encoder frame, azimuth in [0, 360).
 
+    is_fitted: predicted from a fit of this pass.  is_acquired, has_acquired: the signal then, and at any
+    time until then.
     left_out: readings that no fit has seen so far, by reason, as of the newest fit.
     """
 
     az_deg: float
     el_deg: float
     sigma_deg: float | None
-    source: TrackState
+    is_fitted: bool
+    is_acquired: bool
+    has_acquired: bool
     fit: FitResult | None = None  # the newest one then
     left_out: dict[str, int] = field(default_factory=dict)
 
@@ -57,7 +60,7 @@ def replay(
             current = refitter.refit(_request(waiting, tai_s))
             waiting = []
             left_out = _left_out(current, dwell)
-        yield _line(current, tai_s, _state(current.prediction.kind == "FITTED", is_acquired, has_acquired), left_out)
+        yield _line(current, tai_s, (is_acquired, has_acquired), left_out)
         if reading is not None and dwell.is_locked(reading):
             waiting.append(reading)
         if on_progress is not None and count % 100 == 0:
@@ -79,7 +82,7 @@ def _left_out(reply: RefitReply, dwell: Dwell) -> dict[str, int]:
     return {reason: count for reason, count in counts.items() if count}
 
 
-def _line(reply: RefitReply, tai_s: float, source: TrackState, left_out: dict[str, int]) -> Replayed:
+def _line(reply: RefitReply, tai_s: float, signal: tuple[bool, bool], left_out: dict[str, int]) -> Replayed:
     prediction = reply.prediction
     point = prediction.at(tai_s)
     if point is None:
@@ -88,13 +91,6 @@ def _line(reply: RefitReply, tai_s: float, source: TrackState, left_out: dict[st
     if prediction.sigma_deg is not None:
         index = min(round((tai_s - prediction.start_tai_s) / prediction.step_s), prediction.sigma_deg.size - 1)
         sigma_deg = float(prediction.sigma_deg[index])
-    return Replayed(point.az_deg % 360.0, point.el_deg, sigma_deg, source, reply.fit, left_out)
-
-
-def _state(is_fitted: bool, is_acquired: bool, has_acquired: bool) -> TrackState:
-    """The state in which the daemon would have been, from the signal and the fit."""
-    if is_acquired:
-        return TrackState.AUTOTRACK_FITTED if is_fitted else TrackState.AUTOTRACK_TLE
-    if has_acquired:
-        return TrackState.HOLD_FITTED if is_fitted else TrackState.HOLD_TLE
-    return TrackState.ACQUIRE_TLE
+    return Replayed(
+        point.az_deg % 360.0, point.el_deg, sigma_deg, prediction.kind == "FITTED", *signal, reply.fit, left_out
+    )
