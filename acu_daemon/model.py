@@ -37,10 +37,14 @@ class EarthOrientation:
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """A station together with the Earth orientation in force."""
+    """A station together with the Earth orientation in force.
+
+    has_light_time: whether look angles are of where the signal comes from, range / c late (orbit.look).
+    """
 
     station: Station
     orientation: EarthOrientation = EarthOrientation()
+    has_light_time: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,7 @@
 """Stations, frames and look angles with rates, against Skyfield and against finite differences."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import DATA, needs_data
@@ -8,6 +10,8 @@ from hypothesis import strategies as st
 from made_oems import iss
 from made_orbits import circular
 from skyfield.api import EarthSatellite, load, wgs84
+from skyfield.constants import AU_KM
+from skyfield.relativity import add_aberration
 
 from acu_daemon.model import EarthOrientation, Site, Station, sky_angle_deg
 from acu_daemon.orbit.frames import itrs_from_teme, station_itrs_m, teme_from_itrs
@@ -20,6 +24,8 @@ from acu_daemon.units import EARTH_RATE_RAD_S, wrap_180_array
 
 SKYFIELD_DEG = 1e-4
 SKYFIELD_DEG_S = 1e-5
+LIGHT_TIME_DEG = 1e-7  # what light time and aberration add, ours less theirs
+LIGHT_KM_S = 299792.458
 DIFFERENCE_DEG_S = 2e-5  # SGP4's velocity is the derivative of its position to about 1e-6
 LIST = DATA / "tle_sets" / "celestrak_resource_2018-11-07.txt"
 STATION = Station("Cuiaba", -15.53, -56.07, 277.0)
@@ -132,3 +138,60 @@ def test_a_stretch_of_path_is_interpolated_to_a_centimetre(source: Propagator, s
 @given(st.floats(0.0, 360.0), st.floats(0.0, 90.0))
 def test_one_direction_before_and_beyond_the_zenith_is_no_angle_apart(az_deg: float, el_deg: float) -> None:
     assert sky_angle_deg(az_deg, el_deg, az_deg + 180.0, 180.0 - el_deg) < 1e-5
+
+
+def skyfields_signal(satellite: EarthSatellite, station: Station, tai_s: float) -> tuple[float, float]:
+    """Azimuth and elevation where the signal comes from: light time by steps in GCRS, then Skyfield's aberration."""
+    timescale = load.timescale(builtin=True)
+    topos = wgs84.latlon(station.latitude_deg, station.longitude_deg, station.height_m)
+    here = topos.at(timescale.tai_jd(2451545.0, tai_s / 86400.0))
+    light_s = 0.0
+    for _ in range(4):
+        left = satellite.at(timescale.tai_jd(2451545.0, (tai_s - light_s) / 86400.0))
+        way_km = left.position.km - here.position.km
+        light_s = float(np.linalg.norm(way_km)) / LIGHT_KM_S
+    position_au = way_km / AU_KM
+    add_aberration(position_au, here.velocity.au_per_d, light_s / 86400.0)
+    east_north = topos.rotation_at(here.t) @ position_au  # north, east, up
+    north, east, up = (float(one) for one in east_north)
+    return np.degrees(np.arctan2(east, north)) % 360.0, np.degrees(np.arctan2(up, np.hypot(north, east)))
+
+
+@needs_data
+def test_where_the_signal_comes_from_is_where_skyfield_says_with_light_time_and_aberration() -> None:
+    sets, _ = parse_tle(LIST.read_text(), LIST.name)
+    lines = [line for line in LIST.read_text().splitlines() if line.startswith(("1 ", "2 "))]
+    timescale = load.timescale(builtin=True)
+    rng = np.random.default_rng(7)
+    worst_deg, farthest_deg = 0.0, 0.0
+    for k, elements in enumerate(sets[:60]):
+        station = Station("any", float(rng.uniform(-80, 80)), float(rng.uniform(-180, 180)), float(rng.uniform(0, 3e3)))
+        tai_s = elements.epoch_tai_s + float(rng.uniform(0.0, 86400.0))
+        at = timescale.tai_jd(2451545.0, tai_s / 86400.0)
+        topos = wgs84.latlon(station.latitude_deg, station.longitude_deg, station.height_m)
+        satellite = EarthSatellite(lines[2 * k], lines[2 * k + 1], None, timescale)
+        el, az, _ = (satellite - topos).at(at).altaz()
+        theirs = skyfields_signal(satellite, station, tai_s)
+        site = Site(station, EarthOrientation(ut1_utc_s=float(at.dut1)))
+        geometric, late = (
+            look_at(Sgp4Propagator(elements), np.array([tai_s]), replace(site, has_light_time=is_late))
+            for is_late in (False, True)
+        )
+        shift = np.array([theirs[0] - az.degrees, theirs[1] - el.degrees])
+        ours = np.array([late.az_deg[0] - geometric.az_deg[0], late.el_deg[0] - geometric.el_deg[0]])
+        off = (ours - shift) * (np.cos(el.radians), 1.0)
+        off[0] = wrap_180_array(off[:1])[0]
+        worst_deg = max(worst_deg, float(np.hypot(*off)))
+        farthest_deg = max(farthest_deg, sky_angle_deg(az.degrees, el.degrees, *theirs))
+    assert 1e-3 < farthest_deg < 2e-3
+    assert worst_deg < LIGHT_TIME_DEG
+
+
+@pytest.mark.parametrize("source", [iss(), circular()])
+def test_a_stretch_of_path_has_the_same_light_time_as_single_points(source: Propagator) -> None:
+    site = Site(STATION, has_light_time=True)
+    tai_s = source.epoch_tai_s + np.linspace(0.0, 90.0, 900)
+    single, along = look_at(source, tai_s, site), look_along(source, tai_s, site)
+    plain = look_at(source, tai_s, Site(STATION))
+    assert np.abs(along.el_deg - single.el_deg).max() < 1e-6
+    assert np.abs(plain.el_deg - single.el_deg).max() > 1e-4

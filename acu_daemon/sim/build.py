@@ -1,6 +1,6 @@
 """SIMULATION: puts a fake ACU together from what a command line and a configuration give."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import radians
 from pathlib import Path
 
@@ -45,7 +45,8 @@ def make_sky(
         geometric = read_truth(truth, lowest_el_deg)
     else:
         turned = propagator.corrected(Correction(delta_raan_rad=radians(errors.delta_raan_deg)))
-        geometric = OrbitSky(DelayedPropagator(turned, errors.along_track_s), site, lowest_el_deg)
+        of_now = replace(site, has_light_time=False)
+        geometric = OrbitSky(DelayedPropagator(turned, errors.along_track_s), of_now, lowest_el_deg)
     return geometric if air is None and not errors.light_time else ApparentSky(geometric, air, errors.light_time)
 
 
