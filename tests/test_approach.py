@@ -1,5 +1,6 @@
 """The antenna is at the rise point before the rise, however slow its drives; where it cannot be, it says how late."""
 
+import numpy as np
 import pytest
 from flights import DEMO_TAI_S, demo_target, events_named, flight_of, the_pass
 from hypothesis import given
@@ -10,6 +11,7 @@ from acu_daemon.cli.virtual_pass import Flight
 from acu_daemon.control.approach import longest_lead_s, way_s
 from acu_daemon.control.gate import CHASE_ACCELERATION_MARGIN, CHASE_RATE_MARGIN
 from acu_daemon.model import AxisLimits
+from acu_daemon.orbit.look import look_at
 from acu_daemon.pointing.axis import AxisState, step
 from acu_daemon.sim.scenario import AcuChoice
 from acu_daemon.units import wrap_180
@@ -61,6 +63,21 @@ def test_started_too_late_it_says_how_many_seconds_and_is() -> None:
     assert said["azimuth_s"] > said["elevation_s"]
     standing = min(seen.tai_s for seen in flight.snapshots if seen.state == "PREPOSITION")
     assert standing - the_pass(target, DEMO_TAI_S).rise_tai_s < -58.0
+
+
+@pytest.mark.parametrize("off_deg", [0.0, 60.0])
+def test_started_in_mid_pass_it_says_how_long_after_the_rise_and_until_it_is_on_the_path(off_deg: float) -> None:
+    target = demo_target()
+    begin_tai_s = the_pass(target, DEMO_TAI_S).rise_tai_s + 60.0
+    look = look_at(target.elements.propagator, np.array([begin_tai_s]), target.station.site)
+    antenna = AcuChoice(azimuth_deg=wrap_180(float(look.az_deg[0])) - off_deg, elevation_deg=float(look.el_deg[0]))
+    flight = flight_of(target, begin_tai_s, 40.0, antenna=antenna)
+    assert events_named(flight, "pass.late") == []
+    (said,) = events_named(flight, "pass.joined")
+    assert said["after_rise_s"] == pytest.approx(60.0, abs=3.0)
+    reached_s = off_the_rise_point_s(flight, target) - said["after_rise_s"] if off_deg else 0.0
+    assert said["on_path_s"] == pytest.approx(reached_s, abs=SAID_S)
+    assert (said["off_path_deg"] > 30.0) == (off_deg > 0.0)
 
 
 def test_preposition_s_is_a_floor_for_quick_drives() -> None:

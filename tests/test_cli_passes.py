@@ -1,16 +1,22 @@
 """`acu-daemon passes`: the coming passes as a table and as JSON, of one satellite or of all."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from command_line import Done, acu_daemon
 from config_files import BROUWER, STATION, from_file, replaced, write
+from made_element_sets import omm_text
 
+from acu_daemon.orbit.element_set import ElementSet
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 
 START = "1989-02-01T00:00:00Z"
 SECOND = replaced(BROUWER, "SCD-1", "SCD-9").replace("raan_deg = 240.14", "raan_deg = 60.0")
+MADE = ElementSet(
+    *("omm", "MADE", 90_001, 0.0, 1.08e-3, 1e-3, 1.5, 2.0, 1.0, 0.0, 0.0, "made"),
+)
 # an object at its last day, from the SGP4 verification set (Vallado et al., AIAA 2006-6753): decays within a day
 DECAYING = """1 29141U 85108AA  06170.26783845  .99999999  00000-0  13519-0 0   718
 2 29141  82.4288 273.4882 0015848 277.2124  83.9133 15.93343074  6828
@@ -96,6 +102,27 @@ def test_a_decayed_satellite_hides_no_other_one(tmp_path: Path) -> None:
     alone = acu_daemon("passes", "--config", tmp_path, *start, "--satellite", "gone")
     assert (alone.code, alone.out) == (2, "")
     assert "the satellite has decayed" in alone.err
+
+
+def test_each_pass_is_computed_from_the_set_of_its_file_that_is_nearest_to_it(tmp_path: Path) -> None:
+    epochs = [tai_from_utc(f"2022-02-{day}T00:00:00Z") for day in (11, 13, 15)]
+    sets = [replace(MADE, epoch_tai_s=one, mean_anomaly_rad=0.3 * k) for k, one in enumerate(epochs)]
+    write(tmp_path, many=from_file("MADE", "omm", "many.json"))
+    (tmp_path / "satellites" / "many.json").write_text(omm_text(sets))
+    start = "2022-02-11T06:00:00Z"
+    done = acu_daemon("passes", "--config", tmp_path, "--from", start, "--days", "4", "--json")
+    assert done.code == 0, done.err
+    found = json.loads(done.out)
+    assert {one["elements_epoch_utc"] for one in found} == {utc_text(one) for one in epochs}
+    for one in found:
+        rise_tai_s = tai_from_utc(one["rise_utc"])
+        nearest = min(range(3), key=lambda k: abs(epochs[k] - rise_tai_s))
+        assert one["elements_epoch_utc"] == utc_text(epochs[nearest])
+        (tmp_path / "satellites" / "many.json").write_text(omm_text([sets[nearest]]))
+        around = utc_text(rise_tai_s - 600.0)
+        alone = acu_daemon("passes", "--config", tmp_path, "--from", around, "--days", "0.02", "--json")
+        assert json.loads(alone.out)[0]["rise_utc"] == one["rise_utc"]
+    assert "each pass is computed from the set nearest to it" in done.err
 
 
 @pytest.mark.parametrize(

@@ -139,6 +139,30 @@ def test_all_estimators_are_compared_in_files_beside_the_named_one_a_table_and_a
 
 
 @needs_data
+def test_a_single_estimator_has_its_picture_and_table_and_an_antenna_that_stopped_is_not_compared(
+    tmp_path: Path, config: Path, real: RealPass
+) -> None:
+    readings, (az_deg, el_deg) = recorded(tmp_path / "in.csv", real, step_s=5.0)
+    lines = readings.read_text().splitlines()
+    lost = [k for k, line in enumerate(lines[1:]) if line.endswith(",,,0")]
+    stop = lost[len(lost) // 2]  # followed up to here, then it stands still
+    for k in lost:
+        lines[k + 1] = lines[k + 1].replace(",,,0", f",{az_deg[min(k, stop)]:.5f},{el_deg[min(k, stop)]:.5f},0")
+    readings.write_text("\n".join(lines) + "\n")
+    picture = tmp_path / "one.png"
+    done = replay(config, readings, tmp_path / "out.csv", "--estimator", "full", "--plot", str(picture))
+    assert done.code == 0, done.err
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    what, _, _, row, *_ = done.out.splitlines()
+    stood = re.search(r"against (\d+) readings .*Not compared: (\d+) without lock while the antenna stood", what)
+    assert stood is not None
+    compared, left_out = map(int, stood.groups())
+    assert compared + left_out == len(lost)
+    assert left_out == pytest.approx(len(lost) - 1 - len(lost) // 2, abs=1)
+    assert float(row.split()[3]) < 0.1
+
+
+@needs_data
 def test_the_readings_of_another_satellite_are_told_as_that_with_status_1(
     tmp_path: Path, config: Path, real: RealPass
 ) -> None:
@@ -151,7 +175,7 @@ def test_the_readings_of_another_satellite_are_told_as_that_with_status_1(
     (config / "satellites" / "sat.tle").write_text("\n".join([*lines[:-2], first, f"{second}{digits % 10}"]) + "\n")
     done = replay(config, readings, tmp_path / "out.csv")
     assert done.code == 1, done.err
-    assert "probably not this satellite, NORAD 41335: at their first lock" in done.err
+    assert "probably not this satellite, NORAD 41335: no orbit near the elements goes through" in done.err
     assert len(rows_of(tmp_path / "out.csv")) == len(rows_of(readings))
 
 

@@ -83,3 +83,39 @@ def test_without_anything_to_compare_the_table_has_dashes() -> None:
     assert what_is_compared(seen) == "Nothing to compare: no reading with angles after the first fit."
     assert table(seen, {"one": 0.0})[3].split()[:4] == ["one", "-", "-", "-"]
     assert seen.errors["one"].error_deg.shape == np.empty(0).shape
+
+
+def moving(flags: str, moves: str) -> Comparison:
+    """The path moves by 0.3 deg a second; the antenna with it (f), not at all (s), or back (b), from line to line."""
+    results = [
+        Replayed(100.0 + 0.3 * k, 0.1, None, TrackState.HOLD_FITTED, *((FIT,) if k >= 1 else ()))
+        for k in range(len(flags))
+    ]
+    az_deg, rows = 100.0, []
+    for k, (flag, move) in enumerate(zip(flags, moves, strict=True)):
+        rows.append((float(k), Reading(float(k), az_deg, 0.0, flag == "L")))
+        az_deg += {"f": 0.3, "s": 0.0, "b": -0.6}[move]
+    return compare(rows, {"one": results}, lock_dwell_s=1.0)
+
+
+@pytest.mark.parametrize("away", ["s", "b"])
+def test_an_antenna_that_stands_still_or_moves_unlike_the_path_is_not_compared(away: str) -> None:
+    seen = moving("LLLL" + 60 * "u", 34 * "f" + 30 * away)
+    assert seen.stray_count + seen.line_count == 60
+    assert seen.line_count == pytest.approx(30, abs=3)
+    assert seen.errors["one"].error_deg.max() < 1.0
+    [(begin_s, end_s)] = seen.strays_tai_s
+    assert (begin_s, end_s) == (pytest.approx(34.0, abs=3.0), 63.0)
+    assert f"Not compared: {seen.stray_count} without lock while the antenna stood" in what_is_compared(seen)
+
+
+def test_a_stop_right_at_the_loss_leaves_the_locked_readings_to_compare() -> None:
+    seen = moving("LLLLLL" + 30 * "u", 5 * "f" + 31 * "s")
+    assert not seen.is_held_back
+    assert seen.stray_count == 30
+    assert seen.errors["one"].tai_s.max() == 5.0
+
+
+def test_an_antenna_that_follows_beside_the_path_is_compared_whatever_its_offset() -> None:
+    seen = moving("LLLL" + 30 * "u", 34 * "f")
+    assert (seen.stray_count, seen.line_count) == (0, 30)

@@ -8,7 +8,17 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from acu_daemon.cli.options import Config, beginning, cut_passes, ending, gaps, load_target, open_ends, parse_utc
+from acu_daemon.cli.options import (
+    Config,
+    Target,
+    beginning,
+    cut_passes,
+    ending,
+    gaps,
+    load_target,
+    open_ends,
+    parse_utc,
+)
 from acu_daemon.config import load_station, satellite_names
 from acu_daemon.control.plan import beyond_limits
 from acu_daemon.edge.clock import SystemClock
@@ -16,6 +26,7 @@ from acu_daemon.errors import AcuDaemonError, OrbitError, UsageError
 from acu_daemon.model import Pass
 from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.propagator import spans_tai_s
+from acu_daemon.orbit.selection import nearest_epoch_tai_s
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.orbit.visibility import why_none
 from acu_daemon.pointing.reach import OutOfReach
@@ -29,6 +40,7 @@ class _Seen:
     """A satellite's passes within a search, why there are none, and what there is to say of elements and search."""
 
     passes: list[Pass]
+    epochs_tai_s: dict[Pass, float]  # of the elements that each is computed from
     beyond: dict[Pass, tuple[OutOfReach, ...]]  # when which axis cannot follow
     why_none: str
     said: list[str]
@@ -48,13 +60,16 @@ def command(
         typer.Option(
             "--json",
             help="Print a JSON list, angles in degrees; where satellites are left out, an object with the list as "
-            "`passes` and them, each with its reason, as `omitted`.",
+            "`passes` and them, each with its reason, as `omitted`.  A pass's `elements_epoch_utc` says which set of "
+            "elements it is computed from.",
         ),
     ] = False,
 ) -> None:
     """Show the passes above the station's lowest elevation: rise, duration, culmination, set.
 
     Where the limits of an axis do not hold a pass, its line says which axis cannot follow, from when, for how long.
+
+    Of several element sets of a satellite in its file, each pass is computed from the one nearest to it in time.
 
     A satellite whose files or elements cannot be used is left out with its reason, the others are shown; exit status 2
     where none is left.
@@ -104,12 +119,46 @@ def _search(config: Path, name: str, start_tai_s: float, end_tai_s: float) -> _S
     if until := ending(target, end_tai_s):
         said.append(f"warning: {name}: {until}, no pass is looked for after that")
     lowest_deg = target.station.station.min_elevation_deg
-    found = find_passes(propagator, site, start_tai_s, end_tai_s, lowest_deg)
+    by_epoch = _passes_by_epoch(config, name, target, start_tai_s, end_tai_s)
+    found = [one for _, of_set in by_epoch for one in of_set]
+    if len(by_epoch) > 1:
+        used = ", ".join(f"{len(of_set)} of {utc_text(one.elements.epoch_tai_s, 0)}" for one, of_set in by_epoch)
+        said.append(f"note: {name}: each pass is computed from the set nearest to it: {used}")
     said += [f"warning: {name}: {text}" for text in gaps(target, start_tai_s, end_tai_s) + cut_passes(target, found)]
     is_told = bool(found) or bool(until) or is_ephemeris
     limits = target.station.acu.azimuth.limits(), target.station.acu.elevation.limits()
-    beyond = {one: beyond_limits(propagator, site, one, *limits) for one in found}
-    return _Seen(found, beyond, "" if is_told else why_none(propagator, site, start_tai_s, end_tai_s, lowest_deg), said)
+    beyond = {
+        one: beyond_limits(of.elements.propagator, site, one, *limits) for of, of_set in by_epoch for one in of_set
+    }
+    epochs_tai_s = {one: of.elements.epoch_tai_s for of, of_set in by_epoch for one in of_set}
+    return _Seen(
+        found,
+        epochs_tai_s,
+        beyond,
+        "" if is_told else why_none(propagator, site, start_tai_s, end_tai_s, lowest_deg),
+        said,
+    )
+
+
+def _passes_by_epoch(
+    config: Path, name: str, target: Target, start_tai_s: float, end_tai_s: float
+) -> list[tuple[Target, list[Pass]]]:
+    """The passes, each from the set of the file that is nearest to its rise; by set, in order."""
+    lowest_deg = target.station.station.min_elevation_deg
+    by_epoch: list[tuple[Target, list[Pass]]] = []
+    from_tai_s = start_tai_s
+    while True:
+        elements = target.elements
+        found = find_passes(elements.propagator, target.station.site, from_tai_s, end_tai_s, lowest_deg)
+        epochs_tai_s = elements.epochs_tai_s or (elements.epoch_tai_s,)
+        nearer_tai_s = [nearest_epoch_tai_s(epochs_tai_s, max(one.rise_tai_s, start_tai_s)) for one in found]
+        count = next((k for k, one in enumerate(nearer_tai_s) if one > elements.epoch_tai_s), len(found))
+        if count or not by_epoch:
+            by_epoch.append((target, found[:count]))
+        if count == len(found):
+            return by_epoch
+        from_tai_s = found[count - 1].set_tai_s + 1.0 if count else from_tai_s
+        target = load_target(config, name, start_tai_s, is_strict=False, at_tai_s=nearer_tai_s[count])
 
 
 def _show(
@@ -118,7 +167,12 @@ def _show(
     rows = [(name, one, of.beyond.get(one, ())) for name, of in seen.items() for one in of.passes]
     rows.sort(key=lambda row: row[1].rise_tai_s)
     if as_json:
-        passes = [_as_json(name, one, start_tai_s, end_tai_s) | _beyond(beyond) for name, one, beyond in rows]
+        passes = [
+            _as_json(name, one, start_tai_s, end_tai_s)
+            | {"elements_epoch_utc": utc_text(seen[name].epochs_tai_s[one])}
+            | _beyond(beyond)
+            for name, one, beyond in rows
+        ]
         left_out = [{"satellite": name, "reason": reason} for name, reason in omitted.items()]
         typer.echo(json.dumps({"passes": passes, "omitted": left_out} if omitted else passes, indent=1))
         return

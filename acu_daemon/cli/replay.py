@@ -10,7 +10,8 @@ from typing import Annotated
 import typer
 
 from acu_daemon.assist.estimators.estimator import ESTIMATORS
-from acu_daemon.assist.session.estimator_comparison import compare, what_is_left_out, why_not_this_satellite
+from acu_daemon.assist.screening.another_satellite import why_not_this_satellite
+from acu_daemon.assist.session.estimator_comparison import compare, locked_readings, what_is_left_out
 from acu_daemon.assist.session.refit import RefitSetup
 from acu_daemon.assist.session.replay_readings import BUFFER_S, Replayed, replay
 from acu_daemon.cli.options import SPARE_S, Config, Satellite, Target, lacking, load_target, whose_recording
@@ -56,18 +57,30 @@ def command(
             "errors, and OUT.png, their errors over time.  Default: the satellite's TOML.",
         ),
     ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(
+            "--plot",
+            metavar="OUT.png",
+            help="Draw the errors over time here, and print the table of them, of a single estimator too.  Default: "
+            f"OUT.png beside the files of --estimator {ALL}, else none.",
+        ),
+    ] = None,
 ) -> None:
     """Predict every recorded instant from the locked readings before it, as the daemon would have.
 
-    Readings: any rate from 0.2 Hz up; `locked` is the raw flag, 0 or 1; angles may be empty where it is 0.  With
-    --estimator all, readings without lock that have angles are what the predictions are compared with.
+    Readings: any rate from 0.2 Hz up; `locked` is the raw flag, 0 or 1; angles may be empty where it is 0.  What
+    the predictions are compared with, by --estimator all and --plot: readings without lock that have angles, but for
+    those of an antenna that did not follow the path, as after a stop; where there are none, the locked ones.
 
     Exit status: 0; 1 the readings are probably not of this satellite (the files are written all the same), by the JSON
     beside them or by what it takes to fit them; 2 wrong use or configuration.
     """
     names: list[str | None] = [*ESTIMATORS] if estimator == ALL else [estimator]
     paths = {name: _beside(out, name) if estimator == ALL else out for name in names}
-    refuse_unwritable(*paths.values())
+    if estimator == ALL and picture is None:
+        picture = out.with_suffix(".png")
+    refuse_unwritable(*paths.values(), *([picture] if picture is not None else []))
     for path in paths.values():
         try:
             is_same = path.exists() and readings.exists() and path.samefile(readings)
@@ -91,12 +104,12 @@ def command(
         started_s = time.perf_counter()
         results[name] = _replay_to(job, name, path)
         seconds[name] = time.perf_counter() - started_s
-    if estimator == ALL:
-        _compare(job, results, seconds, out.with_suffix(".png"))
-    else:
+    if picture is not None:
+        _compare(job, results, seconds, picture)
+    if estimator != ALL:
         (only,) = results.values()
         typer.echo(f"readings left out of the fit: {what_is_left_out(only[-1].left_out)}", err=True)
-    if reasons := [*_said_otherwise(readings, job.target), *_fitted_otherwise(job, results)]:
+    if reasons := [*_said_otherwise(readings, job.target), *_fitted_otherwise(job)]:
         typer.echo(f"probably not this satellite, {job.target.elements.label}: {'; '.join(reasons)}", err=True)
         raise typer.Exit(1)
 
@@ -114,9 +127,11 @@ def _said_otherwise(readings: Path, target: Target) -> list[str]:
     return [f"{readings.name} is of {said}"]
 
 
-def _fitted_otherwise(job: _Job, results: dict[str, list[Replayed]]) -> list[str]:
-    best = results.get("full") or next(iter(results.values()))
-    reason = why_not_this_satellite(job.timed, best)
+def _fitted_otherwise(job: _Job) -> list[str]:
+    station = job.target.station
+    settings = estimator_settings(station, job.target.satellite)
+    locked = locked_readings(job.timed, station.receiver.lock_dwell_s)
+    reason = why_not_this_satellite(job.target.elements.propagator, station.site, settings, locked)
     return [reason] if reason else []
 
 

@@ -81,13 +81,12 @@ def look(
 
 
 def pointing(scan: Scan, prediction: Prediction, tai_s: float, config: ControlConfig) -> Pointing | None:
-    """What the registers shall hold: the place, never below the mask nor beyond the elevation's limits."""
+    """What the registers shall hold: the place, never below the mask.  The axes' limits are the gate's."""
     pace = scan.side * pace_s_s(scan, prediction, tai_s, config) if scan.is_moving else 0.0
     point = look(scan, prediction, tai_s, config, pace=pace)
     if point is None:
         return None
-    lowest_deg = max(config.elevation.min_deg, config.min_elevation_deg)
-    el_deg = min(max(point.el_deg, lowest_deg), config.elevation.max_deg)
+    el_deg = max(point.el_deg, config.min_elevation_deg)
     return replace(point, el_deg=el_deg, el_rate_deg_s=point.el_rate_deg_s if el_deg == point.el_deg else 0.0)
 
 

@@ -3,13 +3,13 @@
 Owner of `Tracking`.  Pure.  control.states is the table, control.causes finds what drives it.
 """
 
-from acu_daemon.control.approach import way_to
 from acu_daemon.control.axis_latch import forget_motion
 from acu_daemon.control.causes import find_causes
 from acu_daemon.control.changed import changed
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.extra_exchange import forget_asked
 from acu_daemon.control.intake import doubt_place
+from acu_daemon.control.lateness import lateness
 from acu_daemon.control.orders import Event
 from acu_daemon.control.registers import forget_writes
 from acu_daemon.control.start import begin_after_lost_link
@@ -35,7 +35,7 @@ def walk(
     fields = {"state": str(track), "before": str(before), "cause": str(cause)}
     events.append(Event("state.changed", fields, is_warning=track in ALARMS))
     if track is TrackState.PREPOSITION:
-        events += _lateness(state, sky, now_tai_s, config)
+        events += lateness(state, sky, now_tai_s, config)
     begins_hold = track in HOLDING and before not in HOLDING
     hold_from_tai_s = now_tai_s if begins_hold else tracking.hold_from_tai_s
     tracking = changed(tracking, track=track, entered_tai_s=now_tai_s, hold_from_tai_s=hold_from_tai_s)
@@ -43,19 +43,6 @@ def walk(
     if track is TrackState.LINK_LOST:
         state = doubt_place(forget_motion(forget_writes(forget_asked(begin_after_lost_link(state)))))
     return state
-
-
-def _lateness(state: ControlState, sky: Sky, now_tai_s: float, config: ControlConfig) -> list[Event]:
-    """Say that the antenna sets out too late to be there at the rise."""
-    if sky.plan is None or state.signal.has_acquired:
-        return []
-    way = way_to(sky.plan, state, config)
-    late_s = now_tai_s + way.both_s - sky.plan.rise_tai_s
-    if late_s <= 0.0:
-        return []
-    seconds = {"late_s": late_s, "azimuth_s": way.azimuth_s, "elevation_s": way.elevation_s}
-    fields = {name: round(value, 1) for name, value in seconds.items()}
-    return [Event("pass.late", fields, is_warning=True)]
 
 
 def _is_sure(sky: Sky, now_tai_s: float, config: ControlConfig) -> bool:

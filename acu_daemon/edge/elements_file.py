@@ -39,6 +39,7 @@ class LoadedElements:
     errors: list[str]
     warnings: list[str]
     choice: str = ""  # which of several sets is used, and why
+    epochs_tai_s: tuple[float, ...] = ()  # of all the satellite's sets in the file
 
 
 def load_elements(
@@ -144,7 +145,13 @@ def _from_sets(
     errors, more = check_elements(chosen, section.limits.limits(), now_tai_s)
     warnings = [*selected.warnings, *more, *map(str, notes), *_few([*own, *_others(lost, own)])]
     return LoadedElements(
-        Sgp4Propagator(chosen), chosen.label, chosen.epoch_tai_s, errors, warnings, choice=selected.why
+        Sgp4Propagator(chosen),
+        chosen.label,
+        chosen.epoch_tai_s,
+        errors,
+        warnings,
+        choice=selected.why,
+        epochs_tai_s=selected.epochs_tai_s,
     )
 
 

@@ -1,7 +1,7 @@
 """Which element set of a list is used, and which segments of an ephemeris: by number, by name, nearest in time."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
@@ -19,11 +19,20 @@ _VERSIONS = ("1.0", "2.0", "3.0")  # of orbit ephemeris messages, CCSDS 502.0
 
 @dataclass(frozen=True, slots=True)
 class Selected:
-    """The set to use; why: which of several for one satellite it is, and why, empty where there is but one."""
+    """The set to use; why: which of several for one satellite it is, and why, empty where there is but one.
+
+    epochs_tai_s: of all the satellite's sets, rising.
+    """
 
     elements: ElementSet
     why: str
     warnings: list[str]
+    epochs_tai_s: tuple[float, ...]
+
+
+def nearest_epoch_tai_s(epochs_tai_s: Iterable[float], at_tai_s: float) -> float:
+    """The nearest in time, so that its expected error is the least; the older of two that are as near."""
+    return min(epochs_tai_s, key=lambda one: (abs(one - at_tai_s), one))
 
 
 def select_elements(
@@ -52,8 +61,10 @@ def select_elements(
     warnings: list[str] = []
     if norad_id is None and name is not None and not _are_alike(name, found[0].name):
         warnings.append(_stranger(found[0].file, found[0].label, name))
-    chosen = min(found, key=lambda one: (abs(one.epoch_tai_s - at_tai_s), one.epoch_tai_s))
-    return Selected(chosen, _why(chosen, found, at_tai_s), warnings)
+    epochs_tai_s = tuple(sorted({one.epoch_tai_s for one in found}))
+    nearest_tai_s = nearest_epoch_tai_s(epochs_tai_s, at_tai_s)
+    chosen = next(one for one in found if one.epoch_tai_s == nearest_tai_s)
+    return Selected(chosen, _why(chosen, found, at_tai_s), warnings, epochs_tai_s)
 
 
 def _why(chosen: ElementSet, found: list[ElementSet], at_tai_s: float) -> str:

@@ -39,14 +39,19 @@ def table(seen: Comparison, seconds: dict[str, float]) -> list[str]:
 
 def what_is_compared(seen: Comparison) -> str:
     """One sentence on the readings behind the figures."""
+    strays = (
+        f"  Not compared: {seen.stray_count} without lock while the antenna stood, or moved unlike the path."
+        if seen.stray_count
+        else ""
+    )
     if seen.line_count == 0:
-        return "Nothing to compare: no reading with angles after the first fit."
+        return f"Nothing to compare: no reading with angles after the first fit.{strays}"
     if seen.is_held_back:
         return (
             f"Prediction against {seen.line_count} readings without lock, held back from the fits "
-            "(right only where their angles are the satellite's)."
+            f"(right only where their angles are the satellite's).{strays}"
         )
-    return f"Prediction up to a second ahead against {seen.line_count} locked readings, their noise included."
+    return f"Prediction up to a second ahead against {seen.line_count} locked readings, their noise included.{strays}"
 
 
 def _shift(fit: FitResult | None) -> str:
@@ -62,6 +67,7 @@ def plot(path: Path, seen: Comparison, title: str) -> None:
     axes = figure.add_subplot()
     for spans, shade, label in (
         (seen.losses_tai_s, "#f3e3c3", "no signal"),
+        (seen.strays_tai_s, "#e7c9a9", "the antenna does not follow the path: not compared"),
         (seen.gaps_tai_s, "#dddddd", "no readings: the daemon was stopped"),
     ):
         for k, span in enumerate(spans):
@@ -82,14 +88,14 @@ def plot(path: Path, seen: Comparison, title: str) -> None:
             times, medians = _medians(part.tai_s, error_deg)
             axes.semilogy([_date(one) for one in times], medians, linewidth=1.6, color=colour, label=shown)
     figure.suptitle(title, fontsize=12, fontweight="bold")
-    axes.set_title(what_is_compared(seen), fontsize=9)
+    axes.set_title(what_is_compared(seen).replace(".  ", ".\n"), fontsize=9)
     axes.xaxis_date()  # round times at the ticks
     axes.xaxis.set_major_formatter(DateFormatter("%H:%M:%S"))  # type: ignore[no-untyped-call]
     axes.set_xlabel("UTC")
     axes.set_ylabel("prediction against reading, deg on the sky")
     axes.grid(alpha=0.3, which="major")
     if has_any:
-        figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", frameon=False, ncols=7)
+        figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", frameon=False, ncols=4)
     figure.savefig(path, format="png")
 
 
