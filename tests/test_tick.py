@@ -356,17 +356,17 @@ def test_p5_what_the_gate_refuses_is_counted_every_time_and_logged_once() -> Non
 def test_p5_in_search_too_an_elevation_beyond_its_limits_is_held_there_told_and_counted() -> None:
     held = status(AcuMode.REMOTE_BACKUP)
     flat = replace(CONFIG, elevation=replace(CONFIG.elevation, max_deg=38.0))
-    state, told = replace(ready(TrackState.SEARCH, held), axis_el=AxisState(38.0)), []
+    state, told = remembering(ready(TrackState.SEARCH, held), axis_el=AxisState(38.0)), []
     for k in range(10):
-        state, orders = tick(state, saw(held), FITTED, NOW + 0.1 * k, flat)
-        assert state.track is TrackState.SEARCH
+        state, orders = tick(state, TickInput(saw(held), FITTED, NOW + 0.1 * k), flat)
+        assert state.tracking.track is TrackState.SEARCH
         told += [event.fields["axis"] for event in orders.events if event.name == "gate.limited"]
         assert isinstance(orders.first, WriteAndPoll)
         assert orders.first.el_deg <= 38.0
     [axis] = told
     assert axis.startswith("elevation outside")
-    assert state.limited == axis
-    assert state.gate_limited_count == 10
+    assert state.refusals.limited == axis
+    assert state.refusals.limited_count == 10
 
 
 @pytest.mark.parametrize("mode", [AcuMode.REMOTE_BACKUP, AcuMode.AUTOTRACK])
