@@ -88,8 +88,7 @@ def test_without_anything_to_compare_the_table_has_dashes() -> None:
 def moving(flags: str, moves: str) -> Comparison:
     """The path moves by 0.3 deg a second; the antenna with it (f), not at all (s), or back (b), from line to line."""
     results = [
-        Replayed(100.0 + 0.3 * k, 0.1, None, TrackState.HOLD_FITTED, *((FIT,) if k >= 1 else ()))
-        for k in range(len(flags))
+        Replayed(100.0 + 0.3 * k, 0.1, None, True, False, True, *((FIT,) if k >= 1 else ())) for k in range(len(flags))
     ]
     az_deg, rows = 100.0, []
     for k, (flag, move) in enumerate(zip(flags, moves, strict=True)):

@@ -1,4 +1,4 @@
-"""P6 with real processes: an earlier version's latch holds a `run` until it is cleared, another rehearsal's does not."""
+"""P6 with real processes: an earlier version's latch holds a `run` until it is cleared, an old rehearsal's does not."""
 
 import json
 import re
