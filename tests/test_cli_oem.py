@@ -13,7 +13,7 @@ from made_oems import START, iss, kvn, states, xml
 from real_passes import sky_angles_deg
 
 from acu_daemon.cli.options import coming_pass, load_target
-from acu_daemon.config import load_satellite, load_station
+from acu_daemon.config.load import load_satellite, load_station
 from acu_daemon.edge.elements_file import LoadedElements, load_elements
 from acu_daemon.errors import ElementsError, UsageError
 from acu_daemon.model import EarthOrientation, Pass, Site, Station

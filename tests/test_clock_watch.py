@@ -6,7 +6,7 @@ import pytest
 from flights import RISING_TAI_S, climb, demo_target, events_named
 from test_tick import NOW, path
 
-from acu_daemon.config import control_config
+from acu_daemon.config.to_settings import control_config
 from acu_daemon.daemon.clock_watch import ClockWatch
 from acu_daemon.daemon.live import live_text
 from acu_daemon.edge.clock import LoopClock

@@ -8,8 +8,9 @@ from config_files import BROUWER, STATION, replaced, write
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acu_daemon.config import control_config, estimator_settings, load_satellite, load_station, satellite_names
-from acu_daemon.config_problems import in_words
+from acu_daemon.config.load import load_satellite, load_station, satellite_names
+from acu_daemon.config.problems import in_words
+from acu_daemon.config.to_settings import control_config, estimator_settings
 from acu_daemon.errors import ConfigError
 from acu_daemon.orbit.timescales import tai_from_utc
 

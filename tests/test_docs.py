@@ -13,8 +13,9 @@ from typing import Any
 import pytest
 from config_files import BROUWER, STATION
 
-from acu_daemon.config import parse
-from acu_daemon.config_tables import SatelliteFile, StationFile
+from acu_daemon.config.load import parse
+from acu_daemon.config.satellite_tables import SatelliteFile
+from acu_daemon.config.station_tables import StationFile
 from acu_daemon.sim.scenario import read_scenario
 
 ROOT = Path(__file__).resolve().parents[1]

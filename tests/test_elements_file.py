@@ -11,7 +11,7 @@ import pytest
 from config_files import BROUWER, from_file, replaced, write
 from conftest import DATA, needs_data
 
-from acu_daemon.config import load_satellite, load_station
+from acu_daemon.config.load import load_satellite, load_station
 from acu_daemon.edge import elements_file
 from acu_daemon.edge.elements_file import LoadedElements, load_elements
 from acu_daemon.errors import ElementsError, UsageError

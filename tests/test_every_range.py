@@ -12,7 +12,7 @@ from config_files import BROUWER, STATION, write
 from test_omm import FIELDS, csv_list, json_list, kvn, xml
 from test_tle import ONE, TWO, edited, parse
 
-from acu_daemon.config import load_satellite, load_station
+from acu_daemon.config.load import load_satellite, load_station
 from acu_daemon.errors import ConfigError
 from acu_daemon.orbit.brouwer import BrouwerElements
 from acu_daemon.orbit.elements import ElementLimits, check_brouwer

@@ -14,7 +14,7 @@ from config_files import STATION, write
 from real_acu import real_acu
 
 from acu_daemon.cli.latency_test import _link, fits, histogram
-from acu_daemon.config import load_station
+from acu_daemon.config.load import load_station
 from acu_daemon.daemon.lateness import Lateness
 from acu_daemon.daemon.trial import Trial
 from acu_daemon.edge.link import make_link

@@ -16,7 +16,7 @@ from acu_daemon.assist.estimators.estimator import ESTIMATORS
 from acu_daemon.assist.estimators.full.carry_over import CarryOver
 from acu_daemon.cli.kept import Kept, open_kept
 from acu_daemon.cli.options import coming_pass, load_target
-from acu_daemon.config import estimator_settings
+from acu_daemon.config.to_settings import estimator_settings
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.states import TrackState
 from acu_daemon.edge.clock import SystemClock

@@ -14,7 +14,7 @@ from test_earth_orientation import C04_20, FINALS
 from test_leap_seconds import a_list
 
 from acu_daemon.cli.options import load_target
-from acu_daemon.config import load_station
+from acu_daemon.config.load import load_station
 from acu_daemon.edge.earth_orientation_file import at_date
 from acu_daemon.edge.leap_seconds_file import adopt_system_leap_seconds, find_leap_seconds, leap_seconds_told
 from acu_daemon.errors import UsageError

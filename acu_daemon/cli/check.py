@@ -27,8 +27,8 @@ from acu_daemon.cli.options import (
     parse_utc,
 )
 from acu_daemon.cli.own_daemon import OwnDaemon, find_daemon
-from acu_daemon.config import load_station, satellite_names
-from acu_daemon.config_tables import AcuSection, StationFile
+from acu_daemon.config.load import load_station, satellite_names
+from acu_daemon.config.station_tables import AcuSection, StationFile
 from acu_daemon.control.plan import plan_pass
 from acu_daemon.daemon.health import status_line
 from acu_daemon.daemon.port import AcuPort

@@ -9,8 +9,8 @@ from typing import Any
 import structlog
 
 from acu_daemon.cli.options import Target, coming_pass
-from acu_daemon.config import load_satellite, load_station
-from acu_daemon.config_tables import BrouwerSection, SatelliteFile
+from acu_daemon.config.load import load_satellite, load_station
+from acu_daemon.config.satellite_tables import BrouwerSection, SatelliteFile
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.elements_file import load_elements
 from acu_daemon.errors import AcuDaemonError, ElementsError

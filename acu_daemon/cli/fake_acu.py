@@ -10,7 +10,7 @@ from acu_daemon.cli.options import At, AtMonotonic, Config, Satellite, load_targ
 from acu_daemon.cli.rehearsal import clock_text, meet_in_rehearsal
 from acu_daemon.cli.serving import Control, Place, parse_place, serve_until_stopped
 from acu_daemon.cli.simulated import station_air
-from acu_daemon.config import load_station
+from acu_daemon.config.load import load_station
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.link import BITS_PER_CHARACTER, DEFAULT_BAUD, make_link
 from acu_daemon.edge.loop import run_loop

@@ -4,7 +4,7 @@ import shlex
 from pathlib import Path
 
 from acu_daemon.cli.options import antenna_of
-from acu_daemon.config import load_station
+from acu_daemon.config.load import load_station
 from acu_daemon.edge.control_socket import is_answered, no_daemon
 from acu_daemon.edge.state import Antenna, choice_text, folders_in, state_path
 from acu_daemon.errors import AcuDaemonError

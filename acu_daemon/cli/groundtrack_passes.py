@@ -14,7 +14,7 @@ from acu_daemon.assist.session.refit import RefitSetup
 from acu_daemon.cli.groundtrack_elements import AsJson, Csv, CycleText, Plot, parsed_cycle, write_csv
 from acu_daemon.cli.options import Config, Satellite, load_target
 from acu_daemon.cli.outputs import refuse_no_picture, refuse_unwritable
-from acu_daemon.config import estimator_settings
+from acu_daemon.config.to_settings import estimator_settings
 from acu_daemon.edge.campaign import progress_bar
 from acu_daemon.edge.flux_file import load_flux
 from acu_daemon.edge.recording import read_readings

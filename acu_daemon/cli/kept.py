@@ -12,7 +12,7 @@ import structlog
 from acu_daemon.assist.estimators.estimator import has_covariance
 from acu_daemon.assist.estimators.full.carry_over import CarryOver, carry_over_of, resume_of, why_not, why_not_resume
 from acu_daemon.cli.options import Target
-from acu_daemon.config import estimator_settings
+from acu_daemon.config.to_settings import estimator_settings
 from acu_daemon.control.state import ControlState, Held, remembered
 from acu_daemon.edge.carry_over import FitKeeper, carry_over_path, read_carry_over
 from acu_daemon.edge.clock import SystemClock

@@ -15,8 +15,8 @@ from acu_daemon.cli.check import GO, NO_GO, WARN, Finding, clock_finding
 from acu_daemon.cli.options import check_duration, coming_pass, load_target
 from acu_daemon.cli.outputs import refuse_no_picture, refuse_unwritable
 from acu_daemon.cli.run import make_job
-from acu_daemon.config import load_station
-from acu_daemon.config_tables import StationFile
+from acu_daemon.config.load import load_station
+from acu_daemon.config.station_tables import StationFile
 from acu_daemon.daemon.port import CYCLE_SHARE, LONGEST_EXTRA, AcuPort
 from acu_daemon.daemon.trial import Trial, try_loop
 from acu_daemon.edge.clock import SystemClock

@@ -37,7 +37,8 @@ from acu_daemon.cli.options import (
     whose_recording,
 )
 from acu_daemon.cli.rehearsal import clock_text, meet_in_rehearsal, met_by_chance
-from acu_daemon.config import control_config, estimator_settings, load_station
+from acu_daemon.config.load import load_station
+from acu_daemon.config.to_settings import control_config, estimator_settings
 from acu_daemon.control.state import ControlState
 from acu_daemon.daemon.background import fit_deadline_s
 from acu_daemon.daemon.health import Health

@@ -10,8 +10,8 @@ from typing import Annotated
 import typer
 
 from acu_daemon.cli.options import Config
-from acu_daemon.config import load_station
-from acu_daemon.config_tables import StationFile
+from acu_daemon.config.load import load_station
+from acu_daemon.config.station_tables import StationFile
 from acu_daemon.daemon.port import AcuPort
 from acu_daemon.daemon.stopping import DEADLINE_S, stop_antenna
 from acu_daemon.edge.clock import SystemClock

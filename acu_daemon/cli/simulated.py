@@ -1,6 +1,6 @@
 """What the simulator needs of a station's file."""
 
-from acu_daemon.config_tables import StationFile
+from acu_daemon.config.station_tables import StationFile
 from acu_daemon.sim.build import StationAir
 
 

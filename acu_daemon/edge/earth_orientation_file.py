@@ -7,7 +7,7 @@ No network: whoever fetches finals2000A puts it there.  A file that is old, cut 
 from dataclasses import dataclass
 from pathlib import Path
 
-from acu_daemon.config_tables import StationFile, TimeSection
+from acu_daemon.config.station_tables import StationFile, TimeSection
 from acu_daemon.edge.state import refuse_world_writable
 from acu_daemon.errors import EarthOrientationError
 from acu_daemon.model import EarthOrientation

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from acu_daemon.config_onboard import PassFile, read_pass
+from acu_daemon.config.onboard_tables import PassFile, read_pass
 from acu_daemon.edge.elements_file import LoadedElements, load_elements
 from acu_daemon.errors import AttitudeError, UsageError
 from acu_daemon.model import Pass, Station

@@ -10,18 +10,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from acu_daemon.config import parse, read_toml
-from acu_daemon.config_section import Section
-from acu_daemon.config_tables import (
-    BrouwerSection,
-    ElementsFileSection,
-    Name,
-    Positive,
-    SatelliteFile,
-    SatelliteSection,
-    TimeSection,
-    UtcTime,
-)
+from acu_daemon.config.load import parse, read_toml
+from acu_daemon.config.satellite_tables import BrouwerSection, ElementsFileSection, SatelliteFile, SatelliteSection
+from acu_daemon.config.section import Name, Positive, Section, UtcTime
+from acu_daemon.config.station_tables import TimeSection
 from acu_daemon.model import AxisLimits, Site, Station
 from acu_daemon.onboard.attitude import Agility
 from acu_daemon.onboard.checks import Backlash

@@ -2,7 +2,7 @@
 
 from pydantic import Field, model_validator
 
-from acu_daemon.config_section import Section
+from acu_daemon.config.section import Section
 from acu_daemon.model import Station
 from acu_daemon.pointing.air import Air, refractivity, standard_air
 from acu_daemon.pointing.mount import MOST_DEG, TERMS, Mount

@@ -1,0 +1,34 @@
+"""What every table of a TOML file has in common, and the kinds of values that several have."""
+
+from datetime import UTC, datetime
+from typing import Annotated
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from acu_daemon.orbit.timescales import tai_from_utc
+
+
+def _tai(value: object) -> float:
+    if isinstance(value, datetime):
+        if value.tzinfo is None:
+            raise ValueError("expected a time that ends in Z (UTC)")
+        return tai_from_utc(value.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%S.%fZ"))
+    if isinstance(value, str):
+        return tai_from_utc(value)
+    raise ValueError("expected a time like 1989-01-31T09:58:00Z")
+
+
+UtcTime = Annotated[float, BeforeValidator(_tai)]
+Positive = Annotated[float, Field(gt=0)]
+Name = Annotated[str, Field(min_length=1)]
+
+
+class Section(BaseModel):
+    """A table of a TOML file: no unknown keys, no infinite numbers, no text where a number belongs."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+
+    def _must_be_below(self, lower: str, upper: str) -> None:
+        low, high = getattr(self, lower), getattr(self, upper)
+        if low >= high:
+            raise ValueError(f"{lower} = {low:g}: expected less than {upper} = {high:g}")

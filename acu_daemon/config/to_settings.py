@@ -1,0 +1,64 @@
+"""From the tables of a station and a satellite to what control and the estimators need.  Pure."""
+
+from acu_daemon.assist.estimators.estimator import EstimatorSettings
+from acu_daemon.assist.settings import StateSigmas
+from acu_daemon.config.satellite_tables import SatelliteFile, UncertaintySection
+from acu_daemon.config.station_tables import StationFile
+from acu_daemon.control.axis_watch import Bounds
+from acu_daemon.control.control_config import ControlConfig
+
+HALF_SERVO_TICK_S = 0.010  # ICD section 6: a command waits for half a 50 Hz servo tick on average
+
+
+def control_config(station: StationFile, satellite: SatelliteFile, byte_time_s: float) -> ControlConfig:
+    """What the decision of a tick needs; byte_time_s is the wire time of one character (0 on TCP)."""
+    acu = station.acu
+    wire_s = 17 * byte_time_s  # a WRITE AND STATUS command, ICD section 4
+    return ControlConfig(
+        azimuth=acu.azimuth.limits(),
+        elevation=acu.elevation.limits(),
+        period_s=acu.period_s,
+        sample_delay_s=wire_s + acu.device_delay_s,
+        poll_sample_delay_s=5 * byte_time_s + acu.device_delay_s,
+        effect_delay_s=wire_s + acu.device_delay_s + HALF_SERVO_TICK_S,
+        beamwidth_deg=station.receiver.beamwidth_deg,
+        lock_dwell_s=station.receiver.lock_dwell_s,
+        min_elevation_deg=station.station.min_elevation_deg,
+        preposition_s=station.tracking.preposition_s,
+        acquire_s=satellite.fallback.acquire_s,
+        hold_s=satellite.fallback.hold_s,
+        search_s=satellite.fallback.search_s,
+        search_along_s=station.tracking.search_along_s,
+        search_across_deg=station.tracking.search_across_deg,
+        is_armed=station.safety.arm == "auto",
+        register_watchdog_s=station.safety.register_watchdog_s,
+        clock_alarm_deg=station.safety.clock_alarm_beam_fraction * station.receiver.beamwidth_deg,
+        following=Bounds(station.safety.following_error_deg, station.safety.following_error_s),
+    )
+
+
+def estimator_settings(station: StationFile, satellite: SatelliteFile) -> EstimatorSettings:
+    """What the estimators need of the configuration."""
+    return EstimatorSettings(
+        sigma_azimuth_deg=station.readings.sigma_azimuth_deg,
+        sigma_elevation_deg=station.readings.sigma_elevation_deg,
+        max_fit_elevation_deg=station.tracking.max_fit_elevation_deg,
+        beamwidth_deg=station.receiver.beamwidth_deg,
+        azimuth=station.acu.azimuth.limits(),
+        elevation=station.acu.elevation.limits(),
+        bias_sigma_azimuth_deg=station.readings.bias_sigma_azimuth_deg,
+        bias_sigma_elevation_deg=station.readings.bias_sigma_elevation_deg,
+        bias_sigma_azimuth_sec_deg=station.readings.bias_sigma_azimuth_sec_deg,
+        bias_sigma_elevation_cot_deg=station.readings.bias_sigma_elevation_cot_deg,
+        orbit_sigmas=_orbit_sigmas(satellite.uncertainty),
+        station_sigma_m=station.station.uncertainty_m / 2**0.5,  # of east and of north each
+    )
+
+
+def _orbit_sigmas(given: UncertaintySection) -> StateSigmas | None:
+    """The satellite's own a-priori; None where the file says nothing: then the kind and age of the elements say it."""
+    if given.position_km is None and given.velocity_m_s is None:
+        return None
+    position_m = given.position_km * 1e3 if given.position_km is not None else (given.velocity_m_s or 0.0) * 1e3
+    velocity_m_s = given.velocity_m_s if given.velocity_m_s is not None else position_m * 1e-3  # a low orbit's motion
+    return StateSigmas(position_m, velocity_m_s)
