@@ -22,7 +22,7 @@ from process_load import try_nice
 from real_pass import pass_names, truth_path, truth_span, write_config
 
 from acu_daemon.cli.options import coming_pass, load_target
-from acu_daemon.control.plan import plan_pass
+from acu_daemon.control.tracking.pass_plan import plan_pass
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 
 DEFAULT_PASS = "iss-2022-Huntsville-20220211T2156"

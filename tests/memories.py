@@ -3,8 +3,8 @@
 from dataclasses import fields, replace
 from typing import Any
 
+from acu_daemon.control.safety.status_plausibility import Plausibility, judge
 from acu_daemon.control.state import ControlState
-from acu_daemon.control.status_plausibility import Plausibility, judge
 from acu_daemon.model import AxisLimits
 from acu_daemon.protocol.messages import Status
 

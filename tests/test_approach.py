@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from acu_daemon.cli.options import Target, not_covered
 from acu_daemon.cli.virtual_pass import Flight
-from acu_daemon.control.approach import longest_lead_s, way_s
-from acu_daemon.control.gate import CHASE_ACCELERATION_MARGIN, CHASE_RATE_MARGIN
+from acu_daemon.control.tracking.approach import longest_lead_s, way_s
+from acu_daemon.control.tracking.register_limiter import CHASE_ACCELERATION_MARGIN, CHASE_RATE_MARGIN
 from acu_daemon.model import AxisLimits
 from acu_daemon.orbit.look import look_at
 from acu_daemon.pointing.axis import AxisState, step

@@ -18,7 +18,7 @@ from flights import (
 )
 
 from acu_daemon.cli.virtual_pass import Flight, Stage
-from acu_daemon.control.fence import READS
+from acu_daemon.control.safety.command_permit import READS
 from acu_daemon.protocol.messages import (
     AcuMode,
     Backup,

@@ -6,8 +6,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acu_daemon.control.axis_watch import AWAY_S, AxisSeen, AxisWatch, Bounds, Duty, duty_of, sky_scale, watch_axis
-from acu_daemon.control.encoder_watch import FROZEN_DEG, EncoderWatch, watch_encoders
+from acu_daemon.control.safety.axis_watch import (
+    AWAY_S,
+    AxisSeen,
+    AxisWatch,
+    Bounds,
+    Duty,
+    duty_of,
+    sky_scale,
+    watch_axis,
+)
+from acu_daemon.control.safety.encoder_watch import FROZEN_DEG, EncoderWatch, watch_encoders
 from acu_daemon.model import AxisLimits, Pointing
 from acu_daemon.pointing.axis import AxisState, step
 from acu_daemon.protocol.messages import AcuMode, Backup, Status

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from acu_daemon.control.axis_watch import AxisWatch
 from acu_daemon.control.changed import changed
+from acu_daemon.control.safety.axis_watch import AxisWatch
 from acu_daemon.control.state import ControlState, Latch
 from acu_daemon.control.tick_input import Observation
 

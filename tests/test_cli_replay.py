@@ -16,7 +16,7 @@ from real_passes import RealPass, noisy, sky_angles_deg
 from acu_daemon.assist.estimators.estimator import ESTIMATORS
 from acu_daemon.assist.session.estimator_comparison import compare
 from acu_daemon.assist.session.replay_readings import Replayed
-from acu_daemon.control.states import TrackState
+from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.edge.recording import RecordingWriter
 from acu_daemon.edge.recording_whose import ElementsUsed, Whose, save_whose
 from acu_daemon.model import Reading

@@ -8,11 +8,11 @@ from memories import remembering
 from test_tick import AZ_DEG, CONFIG, EL_DEG, NOW, PLAN, SKY, path, ready, saw, status
 
 from acu_daemon.control.orders import Orders
+from acu_daemon.control.safety.status_plausibility import contradictions
 from acu_daemon.control.state import ControlState, Held
-from acu_daemon.control.states import TrackState
-from acu_daemon.control.status_plausibility import contradictions
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Exchange, Observation, Sky, TickInput
+from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.model import AxisLimits, Prediction, Reading
 from acu_daemon.protocol.messages import AcuMode, Backup, Faults, ReadFaults, Status
 

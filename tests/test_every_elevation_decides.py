@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from memories import Judge, remembering
 
-from acu_daemon.control.axis_watch import AxesWatch, AxisSeen, Bounds, Duty, sky_scale, watch_axes
-from acu_daemon.control.causes import HEARD_BEAMS, ON_POINT_BEAMS, RESUME_DEG, find_causes
 from acu_daemon.control.control_config import ControlConfig
-from acu_daemon.control.encoder_watch import FROZEN_DEG, EncoderWatch, watch_encoders
-from acu_daemon.control.gate import gate
-from acu_daemon.control.search import DWELL_S, ON_PLACE_BEAMS, go_on, look, pace_s_s, row_deg
-from acu_daemon.control.state import Scan, Stage
-from acu_daemon.control.states import Cause, TrackState
-from acu_daemon.control.status_plausibility import CONFIRMED_COUNT, CONFIRMED_DEG, RATE_MARGIN, SLACK_DEG
+from acu_daemon.control.safety.axis_watch import AxesWatch, AxisSeen, Bounds, Duty, sky_scale, watch_axes
+from acu_daemon.control.safety.encoder_watch import FROZEN_DEG, EncoderWatch, watch_encoders
+from acu_daemon.control.safety.status_plausibility import CONFIRMED_COUNT, CONFIRMED_DEG, RATE_MARGIN, SLACK_DEG
+from acu_daemon.control.state import Scan, StartStage
 from acu_daemon.control.tick_input import PassPlan, Sky
-from acu_daemon.control.track_frame import beside, offset_of
+from acu_daemon.control.tracking.causes import HEARD_BEAMS, ON_POINT_BEAMS, RESUME_DEG, find_causes
+from acu_daemon.control.tracking.register_limiter import limit
+from acu_daemon.control.tracking.scan import DWELL_S, ON_PLACE_BEAMS, go_on, look, pace_s_s, row_deg
+from acu_daemon.control.tracking.state_table import Cause, TrackState
+from acu_daemon.control.tracking.track_frame import beside, offset_of
 from acu_daemon.model import AxisLimits, Model, Pointing, Prediction, Reading
 from acu_daemon.pointing.axis import AxisState
 from acu_daemon.protocol.messages import AcuMode, Backup, Status
@@ -152,7 +152,7 @@ def causes(
 ) -> set[Cause]:
     plan = PassPlan(NOW - from_rise_s, NOW + 500.0, NOW - 200.0, 100.0, path.at(NOW).el_deg)
     seen = replace(seen, az_deg=place[0] % 360.0, el_deg=place[1])
-    state = remembering(track=track, entered_tai_s=NOW - 1.0, stage=Stage.READY, status=seen, az_deg=place[0])
+    state = remembering(track=track, entered_tai_s=NOW - 1.0, stage=StartStage.READY, status=seen, az_deg=place[0])
     return find_causes(state, Sky(path, None, plan), 0.0, NOW, CONFIG)
 
 
@@ -286,7 +286,7 @@ def test_an_azimuth_that_comes_to_its_path_enters_the_beam_as_slowly_at_every_el
         state = remembering(
             status=status, axis_az=register, axis_el=AxisState(el_deg), was_followed=True, track_of_readings=readings
         )
-        register = gate(Pointing(100.0, el_deg, 0.0, 0.0), state, NOW, is_followed=True, dt_s=0.1, config=config).az
+        register = limit(Pointing(100.0, el_deg, 0.0, 0.0), state, NOW, is_followed=True, dt_s=0.1, config=config).az
         left_deg.append(abs(register.position_deg - 100.0) * cos_el)
         assert len(left_deg) < 200
     assert left_deg[-2] - left_deg[-1] < 1.2 * 0.1 * 0.5 / 1.2

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from acu_daemon.control.states import TrackState
+from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.daemon.health import status_line
 from acu_daemon.daemon.live import LiveLine, live_text
 from acu_daemon.daemon.overview import status_lines

@@ -7,7 +7,7 @@ import pytest
 from flights import DEMO_TAI_S, climb, demo_target, flight_of
 
 from acu_daemon.cli.virtual_pass import Flight
-from acu_daemon.control.states import ACTIVE
+from acu_daemon.control.tracking.state_table import ACTIVE
 from acu_daemon.daemon.live import live_text
 from acu_daemon.daemon.verdict import Level, verdict
 from acu_daemon.sim.scenario import AcuChoice

@@ -13,10 +13,10 @@ from test_tick import AZ_DEG, CONFIG, EL_DEG, NOW, PLAN, SKY, ready, saw, status
 
 from acu_daemon.assist.session.prediction import predict
 from acu_daemon.control.state import ControlState, PathOffset
-from acu_daemon.control.states import TrackState
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Sky, TickInput
-from acu_daemon.control.track_frame import beside, extents, offset_of
+from acu_daemon.control.tracking.state_table import TrackState
+from acu_daemon.control.tracking.track_frame import beside, extents, offset_of
 from acu_daemon.model import Model, Prediction, sky_angle_deg
 from acu_daemon.orbit.look import look_at
 from acu_daemon.protocol.messages import AcuMode, WriteAndPoll

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from mirrors import MIRRORS, Mirror
-from test_control_search import straight_path
+from test_search import straight_path
 
-from acu_daemon.control.approach import way_s
 from acu_daemon.control.control_config import ControlConfig
-from acu_daemon.control.search import go_on, pace_s_s, pointing
+from acu_daemon.control.safety.turn import TurnWatch, is_pulled_round, watch_goal
 from acu_daemon.control.state import Scan
-from acu_daemon.control.turn import TurnWatch, is_pulled_round, watch_goal
+from acu_daemon.control.tracking.approach import way_s
+from acu_daemon.control.tracking.scan import go_on, pace_s_s, pointing
 from acu_daemon.model import AxisLimits, Model, Reading
 from acu_daemon.pointing.axis import AxisState, step
 from acu_daemon.pointing.keyhole import follow_path

@@ -8,7 +8,7 @@ from acu_daemon.assist.estimators.full.estimated_states import correction_of, ma
 from acu_daemon.assist.session.prediction import predict
 from acu_daemon.assist.session.prediction_spread import spread_of
 from acu_daemon.assist.settings import EstimatorSettings, StateSigmas
-from acu_daemon.control.track_frame import offset_of
+from acu_daemon.control.tracking.track_frame import offset_of
 from acu_daemon.model import Correction, FitResult
 from acu_daemon.orbit.look import look_at
 

@@ -4,7 +4,7 @@ import made_orbits
 import numpy as np
 import pytest
 
-from acu_daemon.control.plan import beyond_limits, plan_pass
+from acu_daemon.control.tracking.pass_plan import beyond_limits, plan_pass
 from acu_daemon.model import AxisLimits, Pass, Site
 from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.passes import find_passes

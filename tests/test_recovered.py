@@ -9,16 +9,16 @@ import pytest
 from fake_sky import AZIMUTH, ELEVATION
 from memories import Judge, remembering
 
-from acu_daemon.control.axis_watch import AWAY_S, AxesWatch, AxisSeen, Bounds, Duty, watch_axes
 from acu_daemon.control.control_config import ControlConfig
-from acu_daemon.control.encoder_watch import EncoderWatch, watch_encoders
-from acu_daemon.control.start import WATCHDOG, WATCHDOG_TRY_S, after_reply
-from acu_daemon.control.state import ControlState, Stage, Watchdog
-from acu_daemon.control.states import TrackState
-from acu_daemon.control.status_plausibility import CONTRADICTING_COUNT, MOVED_COUNT
+from acu_daemon.control.safety.axis_watch import AWAY_S, AxesWatch, AxisSeen, Bounds, Duty, watch_axes
+from acu_daemon.control.safety.encoder_watch import EncoderWatch, watch_encoders
+from acu_daemon.control.safety.status_plausibility import CONTRADICTING_COUNT, MOVED_COUNT
+from acu_daemon.control.safety.turn import BIT_SCORE, DENIED_COUNT, TurnWatch, locate, watch_pull
+from acu_daemon.control.startup import WATCHDOG, WATCHDOG_TRY_S, after_reply
+from acu_daemon.control.state import ControlState, StartStage, Watchdog
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Sky, TickInput
-from acu_daemon.control.turn import BIT_SCORE, DENIED_COUNT, TurnWatch, locate, watch_pull
+from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.model import Correction, FitResult, Pointing, Prediction, Reading
 from acu_daemon.protocol.messages import (
     Ack,
@@ -94,7 +94,7 @@ def run(change: Change | None, lasts: int) -> tuple[ControlState, list[str]]:
     state = remembering(
         track=TrackState.AUTOTRACK_FITTED,
         entered_tai_s=NOW - 50.0,
-        stage=Stage.READY,
+        stage=StartStage.READY,
         status=first,
         az_deg=first.az_deg,
     )
@@ -219,7 +219,7 @@ def test_wild_azimuths_and_wrong_bits_add_up_only_without_good_ones_between() ->
 def test_a_pull_that_ends_is_forgotten() -> None:
     watch = TurnWatch()
     for k in range(40):
-        watch, is_for_good = watch_pull(watch, NOW + 0.1 * k, is_pulled=k % 5 != 4)
+        watch, is_for_good = watch_pull(watch, NOW + 0.1 * k, 20.0 * k, 20.0, AZIMUTH, scale=1.0, is_pulled=k % 5 != 4)
         assert not is_for_good
 
 
@@ -252,7 +252,7 @@ def test_an_encoder_that_moved_in_between_is_not_frozen(rates_deg_s: tuple[float
 
 def test_tries_of_the_register_watchdog_that_an_answer_ended_do_not_count_for_the_next() -> None:
     config = replace(CONFIG, register_watchdog_s=2.0)
-    state, now = remembering(stage=Stage.READY, status=good(0)), NOW
+    state, now = remembering(stage=StartStage.READY, status=good(0)), NOW
     for _ in range(3):
         for share in (0.0, 0.9):
             silent = Exchange(ReadParameter(WATCHDOG), None)

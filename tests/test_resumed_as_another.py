@@ -18,7 +18,7 @@ from acu_daemon.cli.kept import Kept, open_kept
 from acu_daemon.cli.options import coming_pass, load_target
 from acu_daemon.config.to_settings import estimator_settings
 from acu_daemon.control.state import ControlState
-from acu_daemon.control.states import TrackState
+from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.writer import Writer
 from acu_daemon.model import FitResult, Readings

@@ -13,7 +13,7 @@ from structlog.testing import capture_logs
 from test_carry_over_file import CARRIED, FIT
 
 from acu_daemon.control.state import Held
-from acu_daemon.control.states import TrackState
+from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.edge.run_state import RETRY_TICKS, RUN_STATE, RunState, RunStateKeeper, read_run_state
 from acu_daemon.edge.writer import Writer
 from acu_daemon.model import Pass

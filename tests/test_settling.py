@@ -12,7 +12,7 @@ from script_modules import load
 
 from acu_daemon.cli.options import load_target
 from acu_daemon.cli.virtual_pass import Flight, fly
-from acu_daemon.control.lag import PRIOR_LAG_S
+from acu_daemon.control.tracking.lag import PRIOR_LAG_S
 from acu_daemon.edge.fit import InlineFitRunner
 from acu_daemon.sim.scenario import Scenario, read_scenario
 from acu_daemon.sim.sky import read_truth

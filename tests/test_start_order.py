@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 from memories import remembering
 
-from acu_daemon.control.arming import last_command
 from acu_daemon.control.control_config import ControlConfig
-from acu_daemon.control.start import after_reply, next_command
-from acu_daemon.control.state import ControlState, Stage
+from acu_daemon.control.safety.arming import last_command
+from acu_daemon.control.startup import after_reply, next_command
+from acu_daemon.control.state import ControlState, StartStage
 from acu_daemon.control.tick_input import Exchange
 from acu_daemon.model import AxisLimits
 from acu_daemon.protocol.angles import LSB_DEG
@@ -101,14 +101,14 @@ def test_p1_a_start_polls_identifies_reads_writes_the_present_angles_and_reads_t
         *(Identify(), ReadRegisters(), ReadParameter("S")),
         *(WriteRegisters(AZ_DEG, EL_DEG), ReadRegisters()),
     ]
-    assert state.startup.stage is Stage.READY
+    assert state.startup.stage is StartStage.READY
     assert state.startup.tilt_code == 77
     assert acu.registers == (AZ_DEG, EL_DEG)
 
 
 def test_a_sector_preference_left_by_somebody_is_freed_first() -> None:
     acu = SmallAcu(sector=2)
-    assert start(standing(), acu).startup.stage is Stage.READY
+    assert start(standing(), acu).startup.stage is StartStage.READY
     assert acu.sector == 0
     assert acu.asked.index(WriteParameter("S", 0)) < acu.asked.index(WriteRegisters(AZ_DEG, EL_DEG))
 
@@ -116,7 +116,7 @@ def test_a_sector_preference_left_by_somebody_is_freed_first() -> None:
 def test_disarmed_it_stops_before_the_first_write() -> None:
     acu = SmallAcu(sector=2)
     state = start(standing(), acu, replace(CONFIG, is_armed=False))
-    assert state.startup.stage is Stage.REGISTERS_KNOWN
+    assert state.startup.stage is StartStage.REGISTERS_KNOWN
     assert all(isinstance(command, READS) for command in acu.asked)
     assert (acu.count, acu.sector) == (0, 2)
 
@@ -124,22 +124,22 @@ def test_disarmed_it_stops_before_the_first_write() -> None:
 def test_under_local_control_it_waits_before_the_first_write() -> None:
     acu = SmallAcu()
     state = start(standing(is_remote_enabled=False), acu)
-    assert state.startup.stage is Stage.REGISTERS_KNOWN
+    assert state.startup.stage is StartStage.REGISTERS_KNOWN
     assert acu.count == 0
     remote = remembering(state, status=status())
-    assert start(remote, acu).startup.stage is Stage.READY
+    assert start(remote, acu).startup.stage is StartStage.READY
 
 
 def test_p1_the_present_angles_of_a_single_status_are_not_written() -> None:
     acu = SmallAcu()
     state = start(remembering(standing(), is_place_sure=False), acu)
-    assert (state.startup.stage, acu.count) == (Stage.SECTOR_FREE, 0)
-    assert start(remembering(state, is_place_sure=True), acu).startup.stage is Stage.READY
+    assert (state.startup.stage, acu.count) == (StartStage.SECTOR_FREE, 0)
+    assert start(remembering(state, is_place_sure=True), acu).startup.stage is StartStage.READY
 
 
 def test_p1_without_any_status_nothing_is_written() -> None:
     acu = SmallAcu()
-    assert start(ControlState(), acu).startup.stage is Stage.REGISTERS_KNOWN
+    assert start(ControlState(), acu).startup.stage is StartStage.REGISTERS_KNOWN
     assert acu.count == 0
 
 
@@ -150,7 +150,7 @@ def test_an_antenna_outside_its_limits_is_asked_to_the_limit(
     standing_deg: tuple[float, float], written_deg: tuple[float, float]
 ) -> None:
     acu = SmallAcu()
-    assert start(standing(*standing_deg), acu).startup.stage is Stage.READY
+    assert start(standing(*standing_deg), acu).startup.stage is StartStage.READY
     assert acu.registers == pytest.approx(written_deg, abs=LSB_DEG)
     assert is_inside(*acu.registers)
 
@@ -165,7 +165,7 @@ def is_inside(az_deg: float, el_deg: float) -> bool:
 @pytest.mark.parametrize("az_deg", [0.0, -0.001, 359.999, -179.9, 180.0])
 def test_the_read_back_holds_through_north_and_at_any_turn(az_deg: float) -> None:
     wide = replace(CONFIG, azimuth=replace(CONFIG.azimuth, min_deg=-400.0, max_deg=400.0))
-    assert start(standing(az_deg), SmallAcu(), wide).startup.stage is Stage.READY
+    assert start(standing(az_deg), SmallAcu(), wide).startup.stage is StartStage.READY
 
 
 def test_registers_that_another_hand_changed_are_written_again() -> None:
@@ -177,7 +177,7 @@ def test_registers_that_another_hand_changed_are_written_again() -> None:
             return reply
 
     acu = Meddled()
-    assert start(standing(), acu).startup.stage is Stage.READY
+    assert start(standing(), acu).startup.stage is StartStage.READY
     assert acu.count == 2
 
 
@@ -189,7 +189,7 @@ def test_a_lost_reply_at_any_step_only_repeats_that_step(lost: int) -> None:
         reply = acu.answer(command)
         state = step(state, None if exchange_count == lost else reply, command)
         exchange_count += 1
-    assert state.startup.stage is Stage.READY
+    assert state.startup.stage is StartStage.READY
     assert exchange_count <= 8
     first_write = next(i for i, command in enumerate(acu.asked) if isinstance(command, WriteRegisters))
     assert all(isinstance(command, (*READS, WriteParameter)) for command in acu.asked[:first_write])
@@ -203,18 +203,18 @@ def test_a_refused_write_never_counts_as_done() -> None:
                 return Nak()
             return super().answer(command)
 
-    assert start(standing(), Refusing()).startup.stage is Stage.SECTOR_FREE
+    assert start(standing(), Refusing()).startup.stage is StartStage.SECTOR_FREE
 
 
 def test_a_reply_to_another_question_moves_nothing() -> None:
-    for stage in Stage:
+    for stage in StartStage:
         state = remembering(standing(), stage=stage)
         assert after_reply(state, Exchange(ReadParameter("A"), Parameter("A", 0)), NOW, CONFIG, []) == state
         assert after_reply(state, Exchange(Identify(), Nak()), NOW, CONFIG, []) == state
 
 
 def test_when_it_is_ready_it_asks_for_nothing() -> None:
-    assert next_command(remembering(standing(), stage=Stage.READY), CONFIG) is None
+    assert next_command(remembering(standing(), stage=StartStage.READY), CONFIG) is None
 
 
 LATCHED = remembering(problem="azimuth stands still away from its command", is_stop_due=True)
@@ -223,17 +223,20 @@ LATCHED = remembering(problem="azimuth stands still away from its command", is_s
 @pytest.mark.parametrize(
     ("identities", "stage"),
     [
-        (["S1"], Stage.IDENTIFIED),
-        (["10"], Stage.NEW),
-        (["S9"], Stage.NEW),
-        (["S9", "S9"], Stage.IDENTIFIED),
-        (["S9", "10"], Stage.NEW),
-        (["10", "10"], Stage.NEW),
+        (["S1"], StartStage.IDENTIFIED),
+        (["10"], StartStage.NEW),
+        (["S9"], StartStage.NEW),
+        (["S9", "S9"], StartStage.IDENTIFIED),
+        (["S9", "10"], StartStage.NEW),
+        (["10", "10"], StartStage.NEW),
     ],
 )
-def test_a_rehearsal_gets_on_only_with_an_acu_that_surely_is_simulated(identities: list[str], stage: Stage) -> None:
+def test_a_rehearsal_gets_on_only_with_an_acu_that_surely_is_simulated(
+    identities: list[str], stage: StartStage
+) -> None:
     state, config = LATCHED, replace(CONFIG, is_rehearsal=True)
     for variant in identities:
         state = after_reply(state, Exchange(Identify(), Identity("3842", variant)), NOW, config, [])
     assert state.startup.stage is stage
-    assert last_command(remembering(state, status=status()), config) == (Stop() if stage is Stage.IDENTIFIED else None)
+    wanted = Stop() if stage is StartStage.IDENTIFIED else None
+    assert last_command(remembering(state, status=status()), config) == wanted

@@ -7,12 +7,12 @@ import pytest
 from flights import RISING_TAI_S, climb, commands_between
 from memories import remembering
 from promise_rig import Rig, demo_scene
-from test_hands import GUARDED, latched, moving
+from test_safety import GUARDED, latched, moving
 from test_tick import FITTED, NOW, SKY, saw, status
 
 from acu_daemon.cli.virtual_pass import Stage as Rigged
-from acu_daemon.control.fence import READS
-from acu_daemon.control.state import ControlState, Stage, Watchdog
+from acu_daemon.control.safety.command_permit import READS
+from acu_daemon.control.state import ControlState, StartStage, Watchdog
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Exchange, Observation, Request, TickInput
 from acu_daemon.pointing.axis import AxisState
@@ -77,7 +77,7 @@ def test_p6_a_stop_that_was_garbled_into_a_refusal_is_repeated_at_once() -> None
 
 
 def test_the_register_watchdog_is_cleared_again_when_nobody_answered_but_not_for_ever_when_it_is_refused() -> None:
-    disarmed = remembering(moving(), by_people=False, stage=Stage.REGISTERS_KNOWN)
+    disarmed = remembering(moving(), by_people=False, stage=StartStage.REGISTERS_KNOWN)
     cleared = WriteParameter("W", 0)
     assert extras(disarmed, status(AcuMode.STANDBY), None).count(cleared) >= 5
     assert extras(disarmed, status(AcuMode.STANDBY), Nak()).count(cleared) == 1

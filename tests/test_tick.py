@@ -8,17 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from memories import remembering
 
-from acu_daemon.control.causes import LINK_SILENCE_S
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.extra_exchange import EXTRA_REPEAT_S, REFUSED_EXTRA_S
-from acu_daemon.control.fence import fence
-from acu_daemon.control.lag import LagEstimate
 from acu_daemon.control.orders import Orders
 from acu_daemon.control.registers import REFUSED_PAUSE_S
-from acu_daemon.control.state import ControlState, Lag, Stage
-from acu_daemon.control.states import ACTIVE, TrackState
+from acu_daemon.control.safety.command_permit import permit
+from acu_daemon.control.state import ControlState, Lag, StartStage
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Sky, TickInput
+from acu_daemon.control.tracking.causes import LINK_SILENCE_S
+from acu_daemon.control.tracking.lag import LagEstimate
+from acu_daemon.control.tracking.state_table import ACTIVE, TrackState
 from acu_daemon.model import AxisLimits, Prediction, Reading
 from acu_daemon.pointing.axis import AxisState
 from acu_daemon.protocol.angles import LSB_DEG
@@ -75,7 +75,7 @@ def ready(track: TrackState, seen: Status) -> ControlState:
     return remembering(
         track=track,
         entered_tai_s=NOW - 50.0,
-        stage=Stage.READY,
+        stage=StartStage.READY,
         status=seen,
         az_deg=AZ_DEG,
         in_force=(NOW - 0.1, AZ_DEG, EL_DEG),
@@ -199,14 +199,14 @@ def test_under_the_local_panel_it_polls_and_nothing_else(track: TrackState) -> N
 @pytest.mark.parametrize("track", list(TrackState))
 @pytest.mark.parametrize("mode", list(AcuMode))
 def test_disarmed_it_only_reads(track: TrackState, mode: AcuMode) -> None:
-    state = remembering(ready(track, status(mode)), stage=Stage.REGISTERS_KNOWN)
+    state = remembering(ready(track, status(mode)), stage=StartStage.REGISTERS_KNOWN)
     _, orders = tick(state, TickInput(saw(status(mode)), SKY, NOW), replace(CONFIG, is_armed=False))
     assert orders.first == Poll()
     assert orders.extra is None or isinstance(orders.extra, ReadFaults)
 
 
-@pytest.mark.parametrize("stage", [stage for stage in Stage if stage is not Stage.READY])
-def test_before_the_start_is_done_no_path_is_written_and_no_mode_selected(stage: Stage) -> None:
+@pytest.mark.parametrize("stage", [stage for stage in StartStage if stage is not StartStage.READY])
+def test_before_the_start_is_done_no_path_is_written_and_no_mode_selected(stage: StartStage) -> None:
     state = remembering(ready(TrackState.IDLE, status(AcuMode.STANDBY)), stage=stage)
     _, orders = tick(state, TickInput(saw(status(AcuMode.STANDBY)), FITTED, NOW), CONFIG)
     for order in (orders.first, orders.extra):
@@ -222,7 +222,7 @@ def test_a_start_goes_on_without_a_poll_while_it_is_sure_where_the_antenna_is(
 ) -> None:
     """On a slow line each poll beside the start's exchanges would cost half a tick."""
     seen = status(AcuMode.STANDBY)
-    state = remembering(ready(TrackState.IDLE, seen), stage=Stage.NEW)
+    state = remembering(ready(TrackState.IDLE, seen), stage=StartStage.NEW)
     _, orders = tick(state, TickInput(saw(seen, is_confirmed=is_confirmed), FITTED, NOW + later_s), CONFIG)
     assert orders.first == first
 
@@ -288,7 +288,7 @@ def test_silence_of_the_link_makes_everything_start_anew() -> None:
     state = remembering(ready(TrackState.AUTOTRACK_FITTED, seen), is_place_sure=True)
     state, orders = tick(state, TickInput(Observation(silence_s=LINK_SILENCE_S + 0.01), FITTED, NOW), CONFIG)
     assert state.tracking.track is TrackState.LINK_LOST
-    assert state.startup.stage is Stage.NEW
+    assert state.startup.stage is StartStage.NEW
     assert not state.intake.is_place_sure  # on a fresh connection the place of the old one is not written
     assert orders.first == Poll()
     assert orders.extra in (None, Identify())
@@ -398,7 +398,7 @@ def test_p5_what_the_gate_holds_back_is_counted() -> None:
 
 def test_p5_what_the_fence_keeps_back_is_counted_and_logged_and_a_poll_goes_in_its_place() -> None:
     state = ready(TrackState.HOLD_FITTED, status(AcuMode.REMOTE_BACKUP))
-    after, orders = fence(state, Orders(WriteAndPoll(100.0, 91.0), Stow()), CONFIG)
+    after, orders = permit(state, Orders(WriteAndPoll(100.0, 91.0), Stow()), CONFIG)
     assert (orders.first, orders.extra) == (Poll(), None)
     assert after.refusals.refusal_count == 2
     assert [event.name for event in orders.events] == ["fence.refused", "fence.refused"]
@@ -443,7 +443,7 @@ def extras_over(refusal: Nak | None, span_s: float) -> int:
 def test_on_a_status_from_before_an_outage_nothing_is_decided() -> None:
     seen = status(AcuMode.STANDBY)
     stale = remembering(ready(TrackState.HOLD_FITTED, seen), reading=saw(seen).reading)
-    for stage in (Stage.NEW, Stage.REGISTERS_KNOWN, Stage.SECTOR_FREE, Stage.READY):
+    for stage in (StartStage.NEW, StartStage.REGISTERS_KNOWN, StartStage.SECTOR_FREE, StartStage.READY):
         _, orders = tick(
             remembering(stale, stage=stage), TickInput(Observation(), FITTED, NOW + LINK_SILENCE_S + 0.1), CONFIG
         )
@@ -510,8 +510,8 @@ def check_allowed(command: Command | None, seen: Status) -> None:
 
 def test_registers_read_back_wrong_are_written_again_before_any_mode() -> None:
     seen = status(AcuMode.STANDBY)
-    state = remembering(ready(TrackState.IDLE, seen), stage=Stage.PRESENT_WRITTEN, present_deg=(AZ_DEG, EL_DEG))
+    state = remembering(ready(TrackState.IDLE, seen), stage=StartStage.PRESENT_WRITTEN, present_deg=(AZ_DEG, EL_DEG))
     wrong = Exchange(ReadRegisters(), Registers(AZ_DEG + 5.0, EL_DEG, 0, 3))
     state, orders = tick(state, TickInput(saw(seen, extra=wrong), FITTED, NOW), CONFIG)
-    assert state.startup.stage is Stage.SECTOR_FREE
+    assert state.startup.stage is StartStage.SECTOR_FREE
     assert isinstance(orders.first, WriteRegisters)

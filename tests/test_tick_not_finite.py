@@ -15,10 +15,10 @@ from test_tick import CONFIG, FITTED, NOW, PLAN, ready, saw, status
 
 from acu_daemon.assist.session.refit import RefitReply, RefitRequest
 from acu_daemon.control.orders import Orders
-from acu_daemon.control.state import ControlState, PathOffset, Stage
-from acu_daemon.control.states import TrackState
+from acu_daemon.control.state import ControlState, PathOffset, StartStage
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Observation, Sky, TickInput
+from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.edge.fit import InlineFitRunner
 from acu_daemon.model import Correction, FitResult, Model
 from acu_daemon.pointing.axis import AxisState
@@ -75,7 +75,7 @@ def check(orders: Orders) -> None:
     bad=st.sampled_from(NOT_FINITE),
     track=st.sampled_from(sorted(TrackState)),
     mode=st.sampled_from(MODES),
-    stage=st.sampled_from([Stage.READY, Stage.READY, Stage.SECTOR_FREE]),
+    stage=st.sampled_from([StartStage.READY, StartStage.READY, StartStage.SECTOR_FREE]),
 )
 def test_p5_one_field_that_is_not_finite_never_raises_and_never_reaches_a_command(where, bad, track, mode, stage):
     name, path = where

@@ -1,4 +1,4 @@
-"""control.turn: which turn the azimuth is on, counted reading by reading, and when that cannot be true."""
+"""control.safety.turn: which turn the azimuth is on, counted reading by reading, and when that cannot be true."""
 
 from dataclasses import replace
 from random import Random
@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acu_daemon.control.turn import (
+from acu_daemon.control.safety.turn import (
     BIT_SCORE,
     DENIED_COUNT,
     PATIENCE_S,

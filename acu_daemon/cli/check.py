@@ -29,7 +29,7 @@ from acu_daemon.cli.options import (
 from acu_daemon.cli.own_daemon import OwnDaemon, find_daemon
 from acu_daemon.config.load import load_station, satellite_names
 from acu_daemon.config.station_tables import AcuSection, StationFile
-from acu_daemon.control.plan import plan_pass
+from acu_daemon.control.tracking.pass_plan import plan_pass
 from acu_daemon.daemon.health import status_line
 from acu_daemon.daemon.port import AcuPort
 from acu_daemon.daemon.verdict import Level, alarms, verdict

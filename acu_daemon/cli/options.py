@@ -12,7 +12,7 @@ from acu_daemon import PROCESS_START_S
 from acu_daemon.config.load import load_satellite, load_station
 from acu_daemon.config.satellite_tables import SatelliteFile
 from acu_daemon.config.station_tables import StationFile
-from acu_daemon.control.approach import longest_lead_s
+from acu_daemon.control.tracking.approach import longest_lead_s
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.earth_orientation_file import EarthUsed, at_date
 from acu_daemon.edge.elements_file import LoadedElements, load_elements

@@ -20,7 +20,7 @@ from acu_daemon.cli.options import (
     parse_utc,
 )
 from acu_daemon.config.load import load_station, satellite_names
-from acu_daemon.control.plan import beyond_limits
+from acu_daemon.control.tracking.pass_plan import beyond_limits
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.errors import AcuDaemonError, OrbitError, UsageError
 from acu_daemon.model import Pass

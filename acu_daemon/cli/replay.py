@@ -17,7 +17,7 @@ from acu_daemon.assist.session.replay_readings import BUFFER_S, Replayed, replay
 from acu_daemon.cli.options import SPARE_S, Config, Satellite, Target, lacking, load_target, whose_recording
 from acu_daemon.cli.outputs import refuse_unwritable
 from acu_daemon.config.to_settings import estimator_settings
-from acu_daemon.control.states import TrackState
+from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.edge.recording import read_readings
 from acu_daemon.edge.recording_whose import read_whose
 from acu_daemon.errors import UsageError

@@ -4,8 +4,8 @@ from acu_daemon.assist.estimators.estimator import EstimatorSettings
 from acu_daemon.assist.settings import StateSigmas
 from acu_daemon.config.satellite_tables import SatelliteFile, UncertaintySection
 from acu_daemon.config.station_tables import StationFile
-from acu_daemon.control.axis_watch import Bounds
 from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.safety.axis_watch import Bounds
 
 HALF_SERVO_TICK_S = 0.010  # ICD section 6: a command waits for half a 50 Hz servo tick on average
 

@@ -1,1 +1,1 @@
-"""The decision of every tick: state machine, lag, safety gate.  Pure."""
+"""The decision of every tick: its memory, what it is given, what it orders; floors: safety and tracking.  Pure."""

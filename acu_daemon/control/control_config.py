@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from acu_daemon.control.axis_watch import Bounds
+from acu_daemon.control.safety.axis_watch import Bounds
 from acu_daemon.model import AxisLimits
 
 

@@ -3,15 +3,15 @@
 A command repeats until the status shows it; what the ACU refuses waits.
 """
 
-from acu_daemon.control.arming import last_command
-from acu_daemon.control.causes import LINK_SILENCE_S
 from acu_daemon.control.changed import changed
 from acu_daemon.control.control_config import ControlConfig
-from acu_daemon.control.interlock import question
-from acu_daemon.control.modes import wanted_mode_command
-from acu_daemon.control.start import next_command
-from acu_daemon.control.state import ControlState, Stage
+from acu_daemon.control.safety.arming import last_command
+from acu_daemon.control.safety.interlock import question
+from acu_daemon.control.startup import next_command
+from acu_daemon.control.state import ControlState, StartStage
 from acu_daemon.control.tick_input import Exchange
+from acu_daemon.control.tracking.causes import LINK_SILENCE_S
+from acu_daemon.control.tracking.mode_selection import wanted_mode_command
 from acu_daemon.protocol.messages import Command, Nak, Stop
 
 EXTRA_REPEAT_S = 0.3  # a command gets this long to show in the status before it is sent again
@@ -41,14 +41,14 @@ def needs_no_poll(state: ControlState, extra: Command, now_tai_s: float, config:
     """Whether it is the start's, which may go on without another status: on a slow line each costs it half a tick."""
     reading = state.intake.reading
     is_fresh = reading is not None and now_tai_s - reading.tai_s < FRESH_S
-    is_of_start = state.startup.stage is not Stage.READY and extra == next_command(state, config)
+    is_of_start = state.startup.stage is not StartStage.READY and extra == next_command(state, config)
     return is_of_start and state.intake.is_place_sure and is_fresh
 
 
 def _are_registers_fresh(state: ControlState, now_tai_s: float) -> bool:
     """Whether a mode may be selected: the registers first, the mode second (ICD section 5)."""
     in_force = state.registers.in_force
-    if state.startup.stage is not Stage.READY or in_force is None:
+    if state.startup.stage is not StartStage.READY or in_force is None:
         return False
     return now_tai_s - in_force[0] < LINK_SILENCE_S
 

@@ -7,12 +7,12 @@ Observation for the next one; the fit is given its readings at once.
 from dataclasses import dataclass, replace
 
 from acu_daemon.assist.reading_gate import acquired_since_tai_s
-from acu_daemon.control.causes import is_acquired
 from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.safety.status_plausibility import judge
 from acu_daemon.control.state import ControlState, Fitting
-from acu_daemon.control.states import AUTOTRACKING
-from acu_daemon.control.status_plausibility import judge
 from acu_daemon.control.tick_input import Arrival, Exchange, Observation
+from acu_daemon.control.tracking.causes import is_acquired
+from acu_daemon.control.tracking.state_table import AUTOTRACKING
 from acu_daemon.model import Reading
 from acu_daemon.protocol.messages import Nak, Poll, Status, WriteAndPoll
 

@@ -2,13 +2,13 @@
 
 from dataclasses import replace
 
-from acu_daemon.control.causes import is_acquired
 from acu_daemon.control.changed import changed
-from acu_daemon.control.encoder_watch import watch_encoders
 from acu_daemon.control.orders import Event
+from acu_daemon.control.safety.encoder_watch import watch_encoders
 from acu_daemon.control.state import ControlState
-from acu_daemon.control.states import AUTOTRACKING
 from acu_daemon.control.tick_input import Sky
+from acu_daemon.control.tracking.causes import is_acquired
+from acu_daemon.control.tracking.state_table import AUTOTRACKING
 from acu_daemon.model import Reading
 from acu_daemon.protocol.messages import AcuMode, Status
 

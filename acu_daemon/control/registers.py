@@ -8,10 +8,10 @@ from dataclasses import replace
 
 from acu_daemon.control.changed import changed
 from acu_daemon.control.control_config import ControlConfig
-from acu_daemon.control.gate import Passed, gate, within_limits
 from acu_daemon.control.orders import Event
 from acu_daemon.control.state import ControlState, Sent
 from acu_daemon.control.tick_input import Observation
+from acu_daemon.control.tracking.register_limiter import Passed, limit, within_limits
 from acu_daemon.model import Pointing
 from acu_daemon.protocol.messages import WriteAndPoll
 
@@ -104,7 +104,7 @@ def write(
     is_followed = status is not None and status.follows_registers
     dt_s = now_tai_s - registers.last_write_tai_s if registers.last_write_tai_s is not None else config.period_s
     dt_s = min(max(dt_s, config.period_s / 2), 3 * config.period_s)
-    passed = gate(wanted, state, now_tai_s, is_followed=is_followed, dt_s=dt_s, config=config)
+    passed = limit(wanted, state, now_tai_s, is_followed=is_followed, dt_s=dt_s, config=config)
     state = _tell(state, passed, wanted, now_tai_s, events, is_followed=is_followed)
     has_goal = is_followed and wanted.is_finite
     goal_az_deg = within_limits(wanted, state.intake.az_deg, config)[0].az_deg if has_goal else None

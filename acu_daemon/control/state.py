@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from enum import IntEnum
 from math import inf
 
-from acu_daemon.control.axis_watch import AxesWatch
 from acu_daemon.control.control_config import ControlConfig
-from acu_daemon.control.encoder_watch import EncoderWatch
-from acu_daemon.control.lag import LagEstimate
-from acu_daemon.control.states import TrackState
-from acu_daemon.control.status_plausibility import Plausibility
-from acu_daemon.control.turn import TurnWatch
+from acu_daemon.control.safety.axis_watch import AxesWatch
+from acu_daemon.control.safety.encoder_watch import EncoderWatch
+from acu_daemon.control.safety.status_plausibility import Plausibility
+from acu_daemon.control.safety.turn import TurnWatch
+from acu_daemon.control.tracking.lag import LagEstimate
+from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.model import Model, Reading
 from acu_daemon.pointing.axis import AxisState
 from acu_daemon.protocol.messages import Command, Identity, Status
@@ -29,7 +29,7 @@ class Watchdog(IntEnum):
     REFUSED = 2  # this ACU has none: asked once, told once
 
 
-class Stage(IntEnum):
+class StartStage(IntEnum):
     """How far the start has come: poll, identity, registers read, the present angles written and read back."""
 
     NEW = 0
@@ -64,9 +64,9 @@ class Fitting:
 
 @dataclass(frozen=True)
 class Startup:
-    """How far the start has come, and what it learned of the ACU.  Owner: control.start."""
+    """How far the start has come, and what it learned of the ACU.  Owner: control.startup."""
 
-    stage: Stage = Stage.NEW
+    stage: StartStage = StartStage.NEW
     identity: Identity | None = None  # as the ACU said it last
     is_identity_sure: bool = False  # a known one, or said twice
     tilt_code: int = 0
@@ -77,7 +77,7 @@ class Startup:
 
 @dataclass(frozen=True)
 class Arming:
-    """Whether anything may be commanded, and the STOP that is owed.  Owner: control.arming."""
+    """Whether anything may be commanded, and the STOP that is owed.  Owner: control.safety.arming."""
 
     by_people: bool | None = None  # as people or another hand at the ACU left it; None: as configured
     disarmed_by: str = ""
@@ -93,7 +93,7 @@ class Held:
 
 @dataclass(frozen=True)
 class ForeignStop:
-    """The antenna that the daemon holds, which only another hand's STOP takes from it.  Owner: control.foreign_stop."""
+    """The antenna that the daemon holds until another hand's STOP.  Owner: control.safety.foreign_stop."""
 
     held: Held | None = None  # None: it does not hold the antenna; kept through lost links and restarts
     is_doubted: bool = False  # found in STANDBY, by a hand or by the register watchdog: FAULT DETAIL tells
@@ -101,14 +101,14 @@ class ForeignStop:
 
 @dataclass(frozen=True)
 class Interlock:
-    """What FAULT DETAIL was asked for.  Owner: control.interlock."""
+    """What FAULT DETAIL was asked for.  Owner: control.safety.interlock."""
 
     faults_read: tuple[bool, ...] | None = None  # the fault bits of the status whose detail was read, while in FAULT
 
 
 @dataclass(frozen=True)
 class Latch:
-    """How the axes obey, and what latched them.  Owner: control.axis_latch."""
+    """How the axes obey, and what latched them.  Owner: control.safety.axis_latch."""
 
     problem: str = ""  # what an axis did wrong; nothing moves until a person clears it
     axes: AxesWatch = AxesWatch()
@@ -161,7 +161,7 @@ class Asked:
 
 @dataclass(frozen=True)
 class Tracking:
-    """The state of the table.  Owner: control.walk."""
+    """The state of the table.  Owner: control.tracking.walk."""
 
     track: TrackState = TrackState.LINK_LOST
     entered_tai_s: float = -inf
@@ -170,7 +170,7 @@ class Tracking:
 
 @dataclass(frozen=True, slots=True)
 class PathOffset:
-    """The satellite beside the prediction from a model, smoothed: seconds late, degrees right (control.track_frame)."""
+    """The satellite beside the prediction, smoothed: seconds late, degrees right (control.tracking.track_frame)."""
 
     along_s: float
     across_deg: float
@@ -179,7 +179,7 @@ class PathOffset:
 
 @dataclass(frozen=True)
 class Signal:
-    """What autotrack has shown of this pass's satellite.  Owner: control.path_offset."""
+    """What autotrack has shown of this pass's satellite.  Owner: control.tracking.path_offset."""
 
     pass_rise_tai_s: float | None = None  # of the pass for which the rest is known
     acquired_since_tai_s: float | None = None
@@ -191,7 +191,7 @@ class Signal:
 
 @dataclass(frozen=True, slots=True)
 class Scan:
-    """How far SEARCH has come (control.search): what each row covers, early to late, s; where it looks now."""
+    """How far SEARCH has come (control.tracking.scan): what each row covers, early to late, s; where it looks now."""
 
     model: Model | None = None
     rows: tuple[tuple[int, tuple[float, float]], ...] = ()
@@ -210,7 +210,7 @@ class Scan:
 
 @dataclass(frozen=True)
 class Search:
-    """The search in progress, or the last one.  Owner: control.searching."""
+    """The search in progress, or the last one.  Owner: control.tracking.search."""
 
     scan: Scan = Scan()
     scanned_tai_s: float = -inf  # the newest reading that the scan has taken
@@ -218,7 +218,7 @@ class Search:
 
 @dataclass(frozen=True)
 class Lag:
-    """The lag from command to encoder, learned per axis.  Owner: control.learned_lag."""
+    """The lag from command to encoder, learned per axis.  Owner: control.tracking.learned_lag."""
 
     az: LagEstimate = LagEstimate()
     el: LagEstimate = LagEstimate()
@@ -236,7 +236,7 @@ class ControlState:
     foreign_stop: ForeignStop = ForeignStop()
     interlock: Interlock = Interlock()
     latch: Latch = Latch()
-    turn: TurnWatch = TurnWatch()  # owner: control.relearn
+    turn: TurnWatch = TurnWatch()  # owner: control.safety.turn_doubt
     encoders: EncoderWatch = EncoderWatch()  # owner: control.intake
     registers: Registers = Registers()
     refusals: Refusals = Refusals()

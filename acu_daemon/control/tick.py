@@ -2,22 +2,15 @@
 
 A tick takes in what has come, supervises the antenna, walks the table of states, aims the registers at the direction
 of the moment they take effect, limits that to what axes and drives can do, and permits it or not.
-control.state is its memory, control.states the table.
+control.state is its memory, control.tracking.state_table the table.
 """
 
 import math
 
-from acu_daemon.control.aim import aim
-from acu_daemon.control.arming import take_stop
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.extra_exchange import needs_no_poll, note_asked, wait_after_refusal, wanted_extra
-from acu_daemon.control.fence import fence
-from acu_daemon.control.finite import finite_only
-from acu_daemon.control.foreign_stop import note_held
 from acu_daemon.control.intake import take_status, watch_for_frozen
-from acu_daemon.control.learned_lag import learn_lag
 from acu_daemon.control.orders import Event, Orders
-from acu_daemon.control.path_offset import drop_unusable_offset, forget_other_pass, learn_of_signal
 from acu_daemon.control.registers import (
     note_as_if_written,
     note_no_write,
@@ -26,14 +19,21 @@ from acu_daemon.control.registers import (
     take_refusal,
     write,
 )
-from acu_daemon.control.relearn import locate_azimuth
-from acu_daemon.control.searching import search
-from acu_daemon.control.start import after_reply, watch_for_power_cycle
-from acu_daemon.control.state import ControlState, Stage
-from acu_daemon.control.states import TrackState
-from acu_daemon.control.supervise import supervise
+from acu_daemon.control.safety.arming import take_stop
+from acu_daemon.control.safety.command_permit import permit
+from acu_daemon.control.safety.finite import finite_only
+from acu_daemon.control.safety.foreign_stop import note_held
+from acu_daemon.control.safety.supervision import supervise
+from acu_daemon.control.safety.turn_doubt import locate_azimuth
+from acu_daemon.control.startup import after_reply, watch_for_power_cycle
+from acu_daemon.control.state import ControlState, StartStage
 from acu_daemon.control.tick_input import Observation, Sky, TickInput
-from acu_daemon.control.walk import walk
+from acu_daemon.control.tracking.aim import aim
+from acu_daemon.control.tracking.learned_lag import learn_lag
+from acu_daemon.control.tracking.path_offset import drop_unusable_offset, forget_other_pass, learn_of_signal
+from acu_daemon.control.tracking.search import search
+from acu_daemon.control.tracking.state_table import TrackState
+from acu_daemon.control.tracking.walk import walk
 from acu_daemon.protocol.messages import Poll
 
 
@@ -56,7 +56,7 @@ def tick(state: ControlState, given: TickInput, config: ControlConfig) -> tuple[
     state = learn_of_signal(state, seen, sky, config, events)
     state = search(before, state, seen, sky, now_tai_s, config, events)
     state, orders = order(before, state, seen, sky, now_tai_s, config, events)
-    return fence(state, orders, config)
+    return permit(state, orders, config)
 
 
 def take_in(
@@ -112,7 +112,7 @@ def _may_write(state: ControlState, now_tai_s: float, config: ControlConfig) -> 
         and not state.arming.is_stop_due
         and not state.foreign_stop.is_doubted
         and not state.turn.is_stopping
-        and state.startup.stage is Stage.READY
+        and state.startup.stage is StartStage.READY
         and status is not None
         and status.is_remote_enabled
         and now_tai_s >= state.registers.refused_until_tai_s

@@ -10,13 +10,13 @@ import structlog
 
 from acu_daemon.assist.reading_gate import ABOVE_MAX_ELEVATION
 from acu_daemon.assist.session.refit import GateVerdict, RefitReply, RefitRequest, RefitSetup, before_fit, predict_from
-from acu_daemon.control.approach import lead_s
 from acu_daemon.control.control_config import ControlConfig
-from acu_daemon.control.finite import is_fit
-from acu_daemon.control.path_offset import resume_pass
-from acu_daemon.control.states import ACTIVE, AUTOTRACKING, HOLDING, TrackState
+from acu_daemon.control.safety.finite import is_fit
 from acu_daemon.control.tick_input import PassPlan
-from acu_daemon.control.track_frame import extents
+from acu_daemon.control.tracking.approach import lead_s
+from acu_daemon.control.tracking.path_offset import resume_pass
+from acu_daemon.control.tracking.state_table import ACTIVE, AUTOTRACKING, HOLDING, TrackState
+from acu_daemon.control.tracking.track_frame import extents
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.fit import FitDiedError, FitFailedError, FitRunner

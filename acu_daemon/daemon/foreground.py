@@ -7,14 +7,14 @@ from typing import Any
 
 import structlog
 
-from acu_daemon.control.arming import owes_stop
-from acu_daemon.control.causes import LINK_SILENCE_S
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.hear import hear
 from acu_daemon.control.orders import Event
-from acu_daemon.control.state import Stage, Watchdog
+from acu_daemon.control.safety.arming import owes_stop
+from acu_daemon.control.state import StartStage, Watchdog
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Arrival, Observation, Request, TickInput
+from acu_daemon.control.tracking.causes import LINK_SILENCE_S
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.clock_watch import ClockWatch
 from acu_daemon.daemon.lateness import Lateness
@@ -109,7 +109,7 @@ class Foreground:
         """While the start's exchanges are answered, the next one follows in the same tick if it fits."""
         end_tai_s, begun_tai_s = due_tai_s + HURRY_SHARE * self._config.period_s, due_tai_s
         while (
-            self._area.state.startup.stage is not Stage.READY
+            self._area.state.startup.stage is not StartStage.READY
             and self._has_news()
             and self._port.is_up
             and not self._port.must_poll
@@ -129,7 +129,7 @@ class Foreground:
     def _next_s(self, begun_tai_s: float) -> float:
         """How long the next decision's exchanges take: one of the start's alone as long as the last, else the most."""
         state = self._area.state
-        is_alone = state.intake.is_place_sure and Stage.NEW < state.startup.stage < Stage.PRESENT_WRITTEN
+        is_alone = state.intake.is_place_sure and StartStage.NEW < state.startup.stage < StartStage.PRESENT_WRITTEN
         return self._clock.tai_s() - begun_tai_s if is_alone else self._port.both_s
 
     async def _tick(self) -> None:
@@ -154,7 +154,7 @@ class Foreground:
         if not port.is_up:
             return
         is_answered = await (self._question() if seen.must_poll else self._do(orders.first))
-        is_starting = area.state.startup.stage is not Stage.READY
+        is_starting = area.state.startup.stage is not StartStage.READY
         is_progress = not seen.must_poll or is_starting  # no poll in the place of a write
         self.answered_count += is_answered and is_progress
         if orders.extra is not None and port.is_up and not port.must_poll:
@@ -168,7 +168,7 @@ class Foreground:
     def _silence_s(self) -> float:
         """On another connection, however soon it came, everything is read again before it is commanded."""
         before, self._connect_count = self._connect_count, self._port.connect_count
-        is_another = before != self._connect_count and self._area.state.startup.stage is not Stage.NEW
+        is_another = before != self._connect_count and self._area.state.startup.stage is not StartStage.NEW
         is_blind = self._clock.monotonic_s() - self._status_s > BLIND_S
         return self._port.silence_s if self._port.is_up and not is_another and not is_blind else math.inf
 

@@ -12,7 +12,7 @@ import textwrap
 from collections.abc import Mapping
 from typing import Protocol
 
-from acu_daemon.control.states import HOLDING, TrackState
+from acu_daemon.control.tracking.state_table import HOLDING, TrackState
 from acu_daemon.daemon import words
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.daemon.verdict import Level, Verdict, alarms, verdict

@@ -1,6 +1,6 @@
 """What `acu-daemon status` prints for people: some lines, the verdict first, alarms next.  Pure."""
 
-from acu_daemon.control.states import TrackState
+from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.daemon import words
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.daemon.verdict import alarms, verdict

@@ -9,7 +9,7 @@ from typing import Any
 
 import structlog
 
-from acu_daemon.control.causes import LINK_SILENCE_S
+from acu_daemon.control.tracking.causes import LINK_SILENCE_S
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.link import Link, open_once
 from acu_daemon.errors import LinkError

@@ -9,17 +9,17 @@ from typing import Any
 import structlog
 
 from acu_daemon.assist.session.refit import RefitSetup
-from acu_daemon.control.approach import lead_s
-from acu_daemon.control.arming import begin_run
 from acu_daemon.control.control_config import ControlConfig
-from acu_daemon.control.foreign_stop import release
-from acu_daemon.control.plan import is_due, is_tracked, plan_pass, why_over
+from acu_daemon.control.safety.arming import begin_run
+from acu_daemon.control.safety.foreign_stop import release
 from acu_daemon.control.state import ControlState, remembered
-from acu_daemon.control.states import ACTIVE
+from acu_daemon.control.tracking.approach import lead_s
+from acu_daemon.control.tracking.pass_plan import is_due, is_tracked, plan_pass, why_over
+from acu_daemon.control.tracking.state_table import ACTIVE
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.background import Background
 from acu_daemon.daemon.foreground import Foreground
-from acu_daemon.daemon.hands import Hands
+from acu_daemon.daemon.operator_requests import Hands
 from acu_daemon.daemon.port import AcuPort
 from acu_daemon.daemon.snapshot import Snapshot, Subject
 from acu_daemon.daemon.taking import take_snapshot

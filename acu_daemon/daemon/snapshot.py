@@ -67,7 +67,7 @@ class Snapshot:
     files_alarm: str = ""  # what cannot be written: recording, state
     limit_alarm: str = ""  # which axis is held at its limit: the satellite is beyond it
     limited_count: int = 0  # writes that were held at a limit
-    clamped_count: int = 0  # followed writes that the gate held back to what the axes can do
+    clamped_count: int = 0  # followed writes that the register limiter held back to what the axes can do
     search: str = ""  # what SEARCH has covered so far
     rejecting: str = ""  # why the newest readings are not fitted
     rejected_counts: dict[str, int] = field(default_factory=dict)  # readings so far, by reason
@@ -77,7 +77,7 @@ class Snapshot:
     acu: str = ""
     verdict: str = ""  # daemon.verdict
     state_s: float | None = None  # since the state began
-    off_path_deg: float | None = None  # where the antenna points beside the path (control.off_path)
+    off_path_deg: float | None = None  # where the antenna points beside the path (control.tracking.off_path)
     is_on_path: bool | None = None  # by no more than half the beam
     path: str = ""  # what that path is made from
     half_beam_deg: float | None = None

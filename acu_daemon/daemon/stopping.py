@@ -5,8 +5,8 @@ from typing import Any
 
 import structlog
 
-from acu_daemon.control.arming import NO_STOP_MODES
-from acu_daemon.control.start import WATCHDOG
+from acu_daemon.control.safety.arming import NO_STOP_MODES
+from acu_daemon.control.startup import WATCHDOG
 from acu_daemon.daemon.port import AcuPort
 from acu_daemon.protocol.messages import Ack, Status, Stop, WriteParameter
 

@@ -4,10 +4,10 @@ from dataclasses import replace
 from math import isfinite
 
 from acu_daemon.control.control_config import ControlConfig
-from acu_daemon.control.off_path import off_path
-from acu_daemon.control.search import covered_text
 from acu_daemon.control.state import ControlState
-from acu_daemon.control.states import AUTOTRACKING, TrackState
+from acu_daemon.control.tracking.off_path import off_path
+from acu_daemon.control.tracking.scan import covered_text
+from acu_daemon.control.tracking.state_table import AUTOTRACKING, TrackState
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.foreground import Foreground
 from acu_daemon.daemon.port import AcuPort

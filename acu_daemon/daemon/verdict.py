@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from acu_daemon.assist.reading_gate import ABOVE_MAX_ELEVATION
-from acu_daemon.control.states import AUTOTRACKING, HOLDING, TrackState
+from acu_daemon.control.tracking.state_table import AUTOTRACKING, HOLDING, TrackState
 from acu_daemon.daemon.snapshot import Snapshot
 
 STILL_DEG_S = 0.2  # slower is noise of the readings, or wind

@@ -1,6 +1,6 @@
 """The phrases of live line, status and service line, from a snapshot.  Pure; what is not known is an empty phrase."""
 
-from acu_daemon.control.states import TrackState
+from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.model import Model
 from acu_daemon.units import DAY_S

@@ -1,0 +1,91 @@
+"""The permit of each command that is sent: none goes out without it, whoever wants it.  Pure.
+
+The register limiter makes good register writes out of a path; the permit knows nothing of paths.  It lets a command out
+only where stage, arming, latch and limits allow it, and what it keeps back is an error of ours: counted and logged.
+"""
+
+from math import isfinite
+
+from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.orders import Event, Orders
+from acu_daemon.control.registers import count_refusals
+from acu_daemon.control.startup import SECTOR, WATCHDOG
+from acu_daemon.control.state import ControlState, StartStage
+from acu_daemon.protocol.angles import LSB_DEG
+from acu_daemon.protocol.messages import (
+    AcuMode,
+    Backup,
+    Command,
+    Identify,
+    Poll,
+    ReadFaults,
+    ReadParameter,
+    ReadRegisters,
+    SelectBackup,
+    SelectMode,
+    Stop,
+    WriteAndPoll,
+    WriteParameter,
+    WriteRegisters,
+    command_text,
+)
+
+READS = (Identify, Poll, ReadRegisters, ReadFaults, ReadParameter)
+SELECTED_MODES = (AcuMode.STANDBY, AcuMode.REMOTE, AcuMode.AUTOTRACK)
+
+
+def permit(state: ControlState, orders: Orders, config: ControlConfig) -> tuple[ControlState, Orders]:
+    """Let orders out; a poll goes in the place of a first command that is kept back, nothing in that of an extra."""
+    first_refusal = refusal(orders.first, state, config)
+    extra_refusal = refusal(orders.extra, state, config) if orders.extra is not None else ""
+    if not first_refusal and not extra_refusal:
+        return state, orders
+    events = list(orders.events)
+    for command, reason in ((orders.first, first_refusal), (orders.extra, extra_refusal)):
+        if command is not None and reason:
+            events.append(Event("fence.refused", {"command": command_text(command), "reason": reason}, is_warning=True))
+    return count_refusals(state, bool(first_refusal) + bool(extra_refusal)), Orders(
+        Poll() if first_refusal else orders.first, None if extra_refusal else orders.extra, tuple(events)
+    )
+
+
+def refusal(command: Command, state: ControlState, config: ControlConfig) -> str:
+    """Why a command must not go out; empty: it may."""
+    if isinstance(command, READS):
+        return ""
+    if config.is_shadow:
+        return "a shadow commands nothing"
+    if isinstance(command, Stop) or command == WriteParameter(WATCHDOG, 0):
+        return ""
+    if state.latch.problem:
+        return f"latched: {state.latch.problem}"
+    if not state.is_armed(config):
+        return "disarmed"
+    if state.intake.status is None or not state.intake.status.is_remote_enabled:
+        return "the local panel has control"
+    return _of_kind(command, state, config)
+
+
+def _of_kind(command: Command, state: ControlState, config: ControlConfig) -> str:
+    stage, is_ready = state.startup.stage, state.startup.stage is StartStage.READY
+    match command:
+        case WriteAndPoll(az_deg=az_deg, el_deg=el_deg) if is_ready:
+            return _of_angles(az_deg, el_deg, config)
+        case WriteRegisters(az_deg=az_deg, el_deg=el_deg) if stage >= StartStage.SECTOR_FREE:
+            return _of_angles(az_deg, el_deg, config)
+        case SelectMode(mode=mode) if is_ready and mode in SELECTED_MODES:
+            return ""
+        case SelectBackup(backup=Backup.REMOTE) if is_ready:
+            return ""
+        case WriteParameter(name=name) if name in (SECTOR, WATCHDOG) and stage >= StartStage.REGISTERS_KNOWN:
+            return ""
+    return "not in its place"
+
+
+def _of_angles(az_deg: float, el_deg: float, config: ControlConfig) -> str:
+    for name, angle_deg, limits in (("azimuth", az_deg, config.azimuth), ("elevation", el_deg, config.elevation)):
+        if not isfinite(angle_deg):
+            return f"{name} is not a finite angle"
+        if not limits.min_deg - LSB_DEG <= angle_deg <= limits.max_deg + LSB_DEG:
+            return f"{name} outside {limits.min_deg:g} to {limits.max_deg:g} deg"
+    return ""

@@ -1,0 +1,67 @@
+"""What comes into the tick and is no number: left out before anything is decided from it.  Pure.
+
+A status, a plan or a fit with one field that is not finite is left out whole; of a prediction only the instants are
+that are not finite (`Pointing.is_finite`): the register limiter refuses them, and the last good register stays.
+"""
+
+from math import inf, isnan
+
+from acu_daemon.control.changed import changed
+from acu_daemon.control.tick_input import Observation, PassPlan, Sky
+from acu_daemon.model import MOST_DEG, FitResult, Prediction, Reading
+from acu_daemon.protocol.messages import Status
+
+MOST_S = 1e12  # 30 000 years: more is no time
+
+
+def finite_only(seen: Observation, sky: Sky) -> tuple[Observation, Sky, str]:
+    """What of an observation and the sky can be used, and the names of what cannot."""
+    refused: list[str] = []
+    status, reading = seen.status, seen.reading
+    if (status is not None and not _is_status(status)) or (reading is not None and not _is_reading(reading)):
+        refused.append("status")
+        seen = changed(seen, status=None, reading=None)
+    if isnan(seen.silence_s):
+        seen = changed(seen, silence_s=inf)
+    prediction, fit, plan = sky.prediction, sky.fit, sky.plan
+    if prediction is not None and not _is_prediction(prediction):
+        refused.append("prediction")
+        prediction = None
+    if fit is not None and not is_fit(fit):
+        refused.append("fit")
+        fit = None
+    if plan is not None and not is_plan(plan):
+        refused.append("plan")
+        plan = None
+    return seen, Sky(prediction, fit, plan) if refused else sky, ", ".join(refused)
+
+
+def _is_status(status: Status) -> bool:
+    return _are_angles(status.az_deg, status.el_deg)
+
+
+def _is_reading(reading: Reading) -> bool:
+    return _are_times(reading.tai_s) and _are_angles(reading.az_deg, reading.el_deg)
+
+
+def _is_prediction(prediction: Prediction) -> bool:
+    return _are_times(prediction.start_tai_s, prediction.end_tai_s) and prediction.step_s > 0.0
+
+
+def is_fit(fit: FitResult) -> bool:
+    """Whether what the decision reads of a fit is finite."""
+    return _are_times(fit.along_s, fit.at_tai_s) and _are_angles(fit.across_deg)
+
+
+def is_plan(plan: PassPlan) -> bool:
+    """Whether a plan is finite."""
+    are_times = _are_times(plan.rise_tai_s, plan.set_tai_s, plan.start_tai_s)
+    return are_times and _are_angles(plan.start_az_deg, plan.start_el_deg)
+
+
+def _are_times(*values_s: float) -> bool:
+    return all(abs(value_s) <= MOST_S for value_s in values_s)
+
+
+def _are_angles(*values_deg: float) -> bool:
+    return all(abs(value_deg) <= MOST_DEG for value_deg in values_deg)

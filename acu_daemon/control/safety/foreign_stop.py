@@ -1,0 +1,89 @@
+"""A STOP by another hand: the antenna in STANDBY that the daemon held.  Owner of `ForeignStop`.  Pure."""
+
+from math import inf
+
+from acu_daemon.control.changed import changed
+from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.state import ControlState, ForeignStop, Held, StartStage
+from acu_daemon.control.tick_input import Observation
+from acu_daemon.control.tracking.state_table import ACTIVE, TrackState
+from acu_daemon.protocol.messages import AcuMode, Backup, Faults, Nak, ReadFaults
+
+STOPPED_FROM = (AcuMode.REMOTE, AcuMode.ACQUIRE, AcuMode.AUTOTRACK, AcuMode.REMOTE_BACKUP)
+ANOTHER_HAND = "another hand that stopped the antenna"
+WATCHDOG_TRIPPED = 2  # of the system nibble of FAULT DETAIL
+
+
+def watch_for_stop(before: ControlState, state: ControlState, config: ControlConfig) -> tuple[ControlState, bool]:
+    """Take STANDBY where the daemon held the antenna for a STOP by another hand, unless the ACU did it itself.
+
+    Held before a lost link, a hang or a crash counts as well.  Sign of a power cycle: the backup is forgotten.  Of the
+    register watchdog: its fault bit.  That stays until it is reset; where it stood already, time must tell.  Where the
+    status does not show it, but time would have been, it is doubted until FAULT DETAIL tells.
+    before: the memory one tick ago.  Returns whether another hand has stopped the antenna.
+    """
+    now, held = state.intake.status, state.foreign_stop.held
+    if now is before.intake.status or now is None or state.intake.reading is None or held is None:
+        return state, False
+    is_stopped = now.mode is AcuMode.STANDBY and now.backup_selected is Backup.REMOTE
+    is_stopped = is_stopped and now.is_remote_enabled  # else it is the local panel's, and ends with it
+    in_force = before.registers.in_force
+    unwritten_s = inf if in_force is None else state.intake.reading.tai_s - in_force[0]
+    is_new_fault = now.has_interlock_fault and not held.has_interlock_fault
+    may_be_watchdog = 0.0 < config.register_watchdog_s <= unwritten_s
+    if not is_stopped or is_new_fault or not state.is_armed(config) or state.latch.problem:
+        return settle(state), False
+    if may_be_watchdog:
+        return changed(state, foreign_stop=ForeignStop(held, not now.has_interlock_fault)), False
+    return state, True
+
+
+def take_faults(state: ControlState, seen: Observation) -> tuple[ControlState, bool]:
+    """Take the answer of FAULT DETAIL: the register watchdog has tripped, or another hand has stopped the antenna."""
+    if not state.foreign_stop.is_doubted or seen.extra is None or seen.extra.command != ReadFaults():
+        return state, False
+    reply = seen.extra.reply  # FAULT DETAIL is answered always; an ACU that refuses it knows no such bit
+    if isinstance(reply, Faults) and reply.system & WATCHDOG_TRIPPED:
+        return forget_held(state), False
+    return state, isinstance(reply, Faults | Nak)
+
+
+def note_held(state: ControlState, config: ControlConfig) -> ControlState:
+    """Remember that the daemon holds the antenna, through lost links and new starts until the ACU says otherwise.
+
+    Disarmed or latched it holds it until its STOP is acknowledged.
+    """
+    status, held = state.intake.status, state.foreign_stop.held
+    if config.is_shadow:  # it belongs to the daemon that commands, before or after this one
+        return state
+    if not state.is_armed(config) or state.latch.problem:
+        has_fault = status is not None and status.has_interlock_fault
+        return _hold(state, (held or Held(has_fault)) if state.arming.is_stop_due else None)
+    if status is None or state.tracking.track is TrackState.LINK_LOST or state.foreign_stop.is_doubted:
+        return state
+    is_held = state.tracking.track in ACTIVE if state.startup.stage is StartStage.READY else held is not None
+    is_held = is_held and not state.turn.is_stopping  # our own STOP is no other hand's
+    return _hold(state, Held(status.has_interlock_fault) if is_held and status.mode in STOPPED_FROM else None)
+
+
+def _hold(state: ControlState, held: Held | None) -> ControlState:
+    if held == state.foreign_stop.held:
+        return state
+    return changed(state, foreign_stop=changed(state.foreign_stop, held=held))
+
+
+def release(state: ControlState) -> ControlState:
+    """Hold the antenna no more: it was stopped, and whoever starts next must not take that for another hand's."""
+    return _hold(state, None)
+
+
+def settle(state: ControlState) -> ControlState:
+    """Doubt no more who has stopped it."""
+    if not state.foreign_stop.is_doubted:
+        return state
+    return changed(state, foreign_stop=ForeignStop(state.foreign_stop.held))
+
+
+def forget_held(state: ControlState) -> ControlState:
+    """Hold the antenna no more, whoever has stopped it."""
+    return changed(state, foreign_stop=ForeignStop())

@@ -1,0 +1,46 @@
+"""The interlock: what a fault is, and the emergency stop or open door that disarms.  Owner of `Interlock`.  Pure."""
+
+from acu_daemon.control.changed import changed
+from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.state import ControlState, Interlock, StartStage
+from acu_daemon.control.tick_input import Observation
+from acu_daemon.control.tracking.state_table import TrackState
+from acu_daemon.protocol.messages import Command, Faults, ReadFaults, Status
+
+EMERGENCY_STOP, DOOR_OPEN = 1, 2  # of the interlock nibble, ICD section 4
+
+
+def watch_interlock(state: ControlState, seen: Observation, config: ControlConfig) -> tuple[ControlState, str]:
+    """Whether a person is at the antenna, and only a person can say that this is over; empty: nobody is seen."""
+    faults = seen.extra.reply if seen.extra is not None else None
+    if not isinstance(faults, Faults) or state.intake.status is None:
+        return state if state.tracking.track is TrackState.FAULT else forget_faults(state), ""
+    state = changed(state, interlock=Interlock(_faults(state.intake.status)))
+    if not faults.interlock & (EMERGENCY_STOP | DOOR_OPEN) or not state.is_armed(config):
+        return state, ""
+    return state, "the emergency stop" if faults.interlock & EMERGENCY_STOP else "an open door"
+
+
+def question(state: ControlState) -> Command | None:
+    """Ask what a fault is, until it is answered, again when its bits change; and what put the antenna in STANDBY."""
+    if state.startup.stage is StartStage.NEW or state.intake.status is None:
+        return None
+    if state.foreign_stop.is_doubted:
+        return ReadFaults()
+    if state.tracking.track is not TrackState.FAULT:
+        return None
+    return ReadFaults() if state.interlock.faults_read != _faults(state.intake.status) else None
+
+
+def forget_faults(state: ControlState) -> ControlState:
+    """The next fault is asked about anew."""
+    return state if state.interlock.faults_read is None else changed(state, interlock=Interlock())
+
+
+def _faults(status: Status) -> tuple[bool, ...]:
+    return (
+        status.has_azimuth_fault,
+        status.has_elevation_fault,
+        status.has_tilt_fault,
+        status.has_interlock_fault,
+    )

@@ -1,0 +1,192 @@
+"""The order of a start, and of a fresh start after the link was lost (design section 3).
+
+Poll, identify, read the registers (for the tilt), free the sector preference, write the present angles, read them back.
+Only then is a path written or a mode selected, and the register watchdog set.  Disarmed, it stops before the first
+write.  An ACU that refuses to have its parameters read or written is taken as it is, with a warning.
+
+Owner of `Startup`.
+"""
+
+from acu_daemon.control.changed import changed
+from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.orders import Event
+from acu_daemon.control.state import ControlState, StartStage, Startup, Watchdog
+from acu_daemon.control.tick_input import Exchange
+from acu_daemon.protocol.angles import LSB_DEG, clamp_deg
+from acu_daemon.protocol.messages import (
+    Ack,
+    Backup,
+    Command,
+    Identify,
+    Identity,
+    Nak,
+    Parameter,
+    ReadParameter,
+    ReadRegisters,
+    Registers,
+    SelectBackup,
+    Status,
+    Stop,
+    WriteParameter,
+    WriteRegisters,
+)
+from acu_daemon.units import wrap_180
+
+SECTOR = "S"  # the ACU's sector preference; 0: a register is followed the nearest way (ICD section 4)
+WATCHDOG = "W"  # the ACU's register watchdog: unwritten registers that are followed put it in STANDBY
+WATCHDOG_LSB_S = 0.02  # ICD section 3
+WATCHDOG_TRY_S = 2.0  # without the answer that is hoped for, and the ACU counts as having no watchdog
+
+
+def next_command(state: ControlState, config: ControlConfig) -> Command | None:
+    """The exchange that brings the start one step further; None when it waits or is done."""
+    startup, status, asked = state.startup, state.intake.status, state.asked.command
+    if startup.stage is StartStage.NEW:
+        return Identify()
+    if startup.stage is StartStage.IDENTIFIED:
+        return ReadRegisters()
+    if state.latch.problem or not state.is_armed(config) or status is None or not status.is_remote_enabled:
+        return None
+    if startup.stage is StartStage.REGISTERS_KNOWN:
+        return WriteParameter(SECTOR, 0) if asked == ReadParameter(SECTOR) else ReadParameter(SECTOR)
+    if startup.stage is StartStage.SECTOR_FREE:
+        return WriteRegisters(*_present(state, config)) if state.intake.is_place_sure else None
+    if startup.stage is StartStage.PRESENT_WRITTEN:
+        return ReadRegisters()
+    if config.register_watchdog_s > 0.0 and startup.watchdog is Watchdog.UNKNOWN:
+        if asked == ReadParameter(WATCHDOG):
+            return WriteParameter(WATCHDOG, watchdog_code(config))
+        return ReadParameter(WATCHDOG)
+    return None
+
+
+def begin_again(state: ControlState, *, keeps_watchdog: bool) -> ControlState:
+    """Free the sector preference and write the present angles again; who the ACU is, is known.
+
+    keeps_watchdog: it stays as it is set.  Else it is set again, but where the ACU has none.
+    """
+    startup = state.startup
+    is_kept = keeps_watchdog or startup.watchdog is Watchdog.REFUSED
+    watchdog = startup.watchdog if is_kept else Watchdog.UNKNOWN
+    stage = min(startup.stage, StartStage.REGISTERS_KNOWN)
+    return changed(state, startup=changed(startup, stage=stage, watchdog=watchdog))
+
+
+def begin_after_lost_link(state: ControlState) -> ControlState:
+    """Begin with the first question; the watchdog, where it was set, is set again."""
+    startup = changed(state.startup, stage=StartStage.NEW, watchdog=_unset(state.startup), watchdog_from_tai_s=None)
+    return changed(state, startup=startup)
+
+
+def watch_for_power_cycle(state: ControlState, status: Status) -> ControlState:
+    """A backup that changed by itself shows a power cycle.
+
+    Then the registers, the tilt among them, are read again, and the watchdog is off.
+    """
+    before = state.intake.status
+    was_remote = before is not None and before.backup_selected is Backup.REMOTE
+    if state.startup.stage is not StartStage.READY or not was_remote or status.backup_selected is Backup.REMOTE:
+        return state
+    startup = changed(state.startup, stage=StartStage.IDENTIFIED, watchdog=_unset(state.startup))
+    return changed(state, startup=startup)
+
+
+def _unset(startup: Startup) -> Watchdog:
+    return Watchdog.UNKNOWN if startup.watchdog is Watchdog.SET else startup.watchdog
+
+
+def watchdog_code(config: ControlConfig) -> int:
+    """Code of the register watchdog's time."""
+    return round(config.register_watchdog_s / WATCHDOG_LSB_S)
+
+
+def _present(state: ControlState, config: ControlConfig) -> tuple[float, float]:
+    """Where the ends of the range have one bearing, within a code of it that bearing: both ends are it, and reached."""
+    el_deg = state.intake.status.el_deg if state.intake.status else 0.0
+    az_deg, ends_deg = state.intake.az_deg, (config.azimuth.min_deg, config.azimuth.max_deg)
+    if abs(ends_deg[1] - ends_deg[0] - 360.0) < LSB_DEG:
+        az_deg = next((end for end in ends_deg if abs(az_deg - end) <= 1.01 * LSB_DEG), az_deg)
+    return (
+        clamp_deg(az_deg, *ends_deg),
+        clamp_deg(el_deg, config.elevation.min_deg, config.elevation.max_deg),
+    )
+
+
+def after_reply(
+    state: ControlState, extra: Exchange, now_tai_s: float, config: ControlConfig, events: list[Event]
+) -> ControlState:
+    """Advance by the reply of an extra exchange; a missing or unexpected reply leaves the stage as it is."""
+    startup, command, reply = state.startup, extra.command, extra.reply
+    is_refused = isinstance(reply, Nak) and state.intake.status is not None and state.intake.status.is_remote_enabled
+    match (startup.stage, command, reply):
+        case (_, Stop(), Ack()):
+            startup = changed(startup, watchdog=_perhaps_set(startup, config))
+        case (_, ReadParameter("W") | WriteParameter("W"), _):
+            startup = _after_watchdog(startup, extra, now_tai_s, config, events, is_refused=is_refused)
+        case (StartStage.READY, SelectBackup(), Ack()) if startup.watchdog is Watchdog.SET:
+            startup = changed(startup, watchdog=Watchdog.UNKNOWN)  # a backup to select may come from a power cycle
+        case (StartStage.NEW, Identify(), Identity() as identity):
+            startup = _identified(startup, identity, config, events)
+        case (StartStage.IDENTIFIED, ReadRegisters(), Registers(tilt_code=tilt_code)):
+            startup = changed(startup, stage=StartStage.REGISTERS_KNOWN, tilt_code=tilt_code)
+        case (StartStage.REGISTERS_KNOWN, ReadParameter("S"), Parameter(code=0)) | (
+            StartStage.REGISTERS_KNOWN,
+            WriteParameter("S"),
+            Ack(),
+        ):
+            startup = changed(startup, stage=StartStage.SECTOR_FREE)
+        case (StartStage.REGISTERS_KNOWN, WriteParameter("S"), Nak()) if is_refused:
+            advice = "the antenna may turn the long way round: set the ACU's parameter S to 0 by hand"
+            events.append(Event("acu.sector_refused", {"advice": advice}, is_warning=True))
+            startup = changed(startup, stage=StartStage.SECTOR_FREE)
+        case (StartStage.SECTOR_FREE, WriteRegisters() as written, Ack()):
+            startup = changed(startup, stage=StartStage.PRESENT_WRITTEN, present_deg=(written.az_deg, written.el_deg))
+        case (StartStage.PRESENT_WRITTEN, ReadRegisters(), Registers() as read):
+            startup = changed(startup, stage=StartStage.READY if _matches(startup, read) else StartStage.SECTOR_FREE)
+    return state if startup is state.startup else changed(state, startup=startup)
+
+
+def _identified(startup: Startup, identity: Identity, config: ControlConfig, events: list[Event]) -> Startup:
+    """One that nobody knows may be a garbled one: it is asked again.  A rehearsal on a real ACU gets no further."""
+    is_sure = identity.is_known or identity == startup.identity
+    if not is_sure:
+        events.append(Event("acu.identity_doubted", {"identity": str(identity)}, is_warning=True))
+    may_go_on = is_sure and (identity.is_simulated or not config.is_rehearsal)
+    stage = StartStage.IDENTIFIED if may_go_on else StartStage.NEW
+    return changed(startup, stage=stage, identity=identity, is_identity_sure=is_sure)
+
+
+def _perhaps_set(startup: Startup, config: ControlConfig) -> Watchdog:
+    """After a STOP the watchdog is cleared also where the link, or a start, was cut off before it was read back."""
+    is_ours = config.register_watchdog_s > 0.0 and startup.watchdog is Watchdog.UNKNOWN
+    return Watchdog.SET if is_ours else startup.watchdog
+
+
+def _after_watchdog(
+    startup: Startup,
+    extra: Exchange,
+    now_tai_s: float,
+    config: ControlConfig,
+    events: list[Event],
+    *,
+    is_refused: bool,
+) -> Startup:
+    """The watchdog counts as set when it was read back; a clean stop has written 0."""
+    if extra.command == WriteParameter(WATCHDOG, 0):
+        is_done = is_refused or isinstance(extra.reply, Ack)
+        return changed(startup, watchdog=Watchdog.UNKNOWN) if is_done else startup
+    if extra.reply == Parameter(WATCHDOG, watchdog_code(config)):
+        return changed(startup, watchdog=Watchdog.SET, watchdog_from_tai_s=None)
+    from_tai_s = now_tai_s if startup.watchdog_from_tai_s is None else startup.watchdog_from_tai_s
+    if is_refused or now_tai_s - from_tai_s >= WATCHDOG_TRY_S:
+        advice = "if this host dies in a loss of signal, the antenna drives to its last command and stays there"
+        events.append(Event("acu.watchdog_refused", {"advice": advice}, is_warning=True))
+        return changed(startup, watchdog=Watchdog.REFUSED, watchdog_from_tai_s=None)
+    return changed(startup, watchdog_from_tai_s=from_tai_s)
+
+
+def _matches(startup: Startup, read: Registers) -> bool:
+    if startup.present_deg is None:
+        return False
+    az_deg, el_deg = startup.present_deg
+    return abs(wrap_180(read.az_deg - az_deg)) < LSB_DEG and abs(read.el_deg - el_deg) < LSB_DEG

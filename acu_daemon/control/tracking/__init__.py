@@ -1,0 +1,1 @@
+"""What is done in a pass: the table of states, where the registers point, what is learned of signal and lag."""

@@ -1,0 +1,60 @@
+"""Where the registers shall point: along the path, for the moment they take effect.  Pure."""
+
+from dataclasses import replace
+
+from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.state import ControlState
+from acu_daemon.control.tick_input import Sky
+from acu_daemon.control.tracking.causes import path_point
+from acu_daemon.control.tracking.path_offset import learned_point
+from acu_daemon.control.tracking.scan import pointing
+from acu_daemon.control.tracking.state_table import ACTIVE, AUTOTRACKING, TrackState
+from acu_daemon.model import Pointing
+from acu_daemon.pointing.wrap import nearest_turn
+
+
+def aim(state: ControlState, sky: Sky, now_tai_s: float, config: ControlConfig) -> Pointing:
+    """The direction the registers shall hold: for the middle of the time they are in force, led by the learned lag."""
+    is_followed = state.intake.status is not None and state.intake.status.follows_registers
+    if is_followed and state.turn.move_to_deg is not None:
+        return replace(_rest(state, is_followed=True), az_deg=state.turn.move_to_deg)
+    lag_az_s, lag_el_s = state.lag_s(config) if is_followed else (0.0, 0.0)
+    aim_tai_s = now_tai_s + config.effect_delay_s + config.period_s / 2
+    az = _point(state, sky, aim_tai_s + lag_az_s, config, is_followed=is_followed)
+    el = az if lag_el_s == lag_az_s else _point(state, sky, aim_tai_s + lag_el_s, config, is_followed=is_followed)
+    if az is None or el is None:
+        return _rest(state, is_followed=is_followed)
+    az_deg = _on_turn(az.az_deg, state, config, is_followed=is_followed)
+    return Pointing(az_deg, el.el_deg, az.az_rate_deg_s, el.el_rate_deg_s)
+
+
+def _point(
+    state: ControlState, sky: Sky, aim_tai_s: float, config: ControlConfig, *, is_followed: bool
+) -> Pointing | None:
+    if state.tracking.track not in ACTIVE or (not is_followed and state.tracking.track not in AUTOTRACKING):
+        return None  # a mode that follows the registers must find them where the antenna is, not where it shall go
+    if state.tracking.track is TrackState.SEARCH and sky.prediction is not None:
+        return pointing(state.search.scan, sky.prediction, aim_tai_s, config) or path_point(sky, aim_tai_s)
+    return learned_point(state, sky, aim_tai_s, follow=is_followed) or path_point(sky, aim_tai_s, follow=is_followed)
+
+
+def _rest(state: ControlState, *, is_followed: bool) -> Pointing:
+    """Where nothing is to be followed: the present angles, or a standstill for an antenna that follows."""
+    registers = state.registers
+    if is_followed and registers.axis_az is not None and registers.axis_el is not None:
+        return Pointing(registers.axis_az.position_deg, registers.axis_el.position_deg, 0.0, 0.0)
+    el_deg = state.intake.status.el_deg if state.intake.status is not None else 0.0
+    return Pointing(state.intake.az_deg, el_deg, 0.0, 0.0)
+
+
+def _on_turn(az_deg: float, state: ControlState, config: ControlConfig, *, is_followed: bool) -> float:
+    """Take a bearing on a turn inside the limits: a follower's own, or past its end the long way round on another.
+
+    PREPOSITION goes to the turn that was planned, and registers that are not followed may hold any.
+    """
+    near_deg = az_deg
+    if is_followed and state.tracking.track is not TrackState.PREPOSITION:
+        register = state.registers.axis_az if state.registers.was_followed else None
+        near_deg = state.intake.az_deg if register is None else register.position_deg
+    turned_deg = nearest_turn(az_deg, near_deg, config.azimuth)
+    return az_deg if turned_deg is None else turned_deg

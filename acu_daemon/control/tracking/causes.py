@@ -1,0 +1,187 @@
+"""Which causes of a transition are present now (control.tracking.state_table has the table they drive)."""
+
+from dataclasses import replace
+from math import cos, hypot, radians
+
+from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.state import ControlState, StartStage
+from acu_daemon.control.tick_input import Sky
+from acu_daemon.control.tracking.approach import ACQUIRE_LEAD_S, lead_s
+from acu_daemon.control.tracking.pass_plan import pass_end_tai_s
+from acu_daemon.control.tracking.register_limiter import within_limits
+from acu_daemon.control.tracking.state_table import HOLDING, Cause, TrackState
+from acu_daemon.control.tracking.track_frame import extents, is_within, offset_of
+from acu_daemon.model import Pointing, sky_angle_deg
+from acu_daemon.pointing.wrap import nearest_turn
+from acu_daemon.protocol.messages import AcuMode, Status
+
+LINK_SILENCE_S = 0.5  # ICD section 1
+ON_POINT_BEAMS = 0.25
+HEARD_BEAMS = 1.0  # a signal that is heard so near to the path is the satellite's
+RESUME_DEG = 5.0  # an antenna this near to the path goes on from an interruption without a new approach
+BEFORE = frozenset({TrackState.IDLE, TrackState.PREPOSITION})  # only there it matters where the antenna stands
+MODE_SETTLE_S = 3.0  # a MODE SELECT takes a moment to show; only later is a left mode the ACU's own doing
+
+
+def find_causes(state: ControlState, sky: Sky, silence_s: float, now_tai_s: float, config: ControlConfig) -> set[Cause]:
+    """All causes that are present; the table decides which of them matters."""
+    status = state.intake.status
+    if silence_s > LINK_SILENCE_S or status is None:
+        return {Cause.LINK_SILENT}
+    if state.latch.problem:
+        return {Cause.LINK_BACK, Cause.LATCHED}
+    causes = {Cause.LINK_BACK} | _of_status(status, is_stow_kept=state.intake.is_stow_kept)
+    if not state.is_armed(config):
+        return causes | _of_others(state, status, sky, now_tai_s, config)
+    if state.startup.stage is StartStage.READY:
+        causes |= _of_signal(state, status, sky, now_tai_s, config)
+        causes |= _of_plan(state, status, sky, now_tai_s, config)
+        causes |= _of_time(state, sky, now_tai_s, config)
+    return causes
+
+
+def _of_others(state: ControlState, status: Status, sky: Sky, now_tai_s: float, config: ControlConfig) -> set[Cause]:
+    """What the ACU does under somebody else's hand, while the daemon is disarmed or in shadow."""
+    if not status.is_autotrack_selected:
+        return {Cause.HANDS_OFF}
+    causes = _of_signal(state, status, sky, now_tai_s, config)
+    still = {Cause.PASS_OVER, Cause.STILL_SELECTED, Cause.STILL_FITTED}
+    return causes | (_of_plan(state, status, sky, now_tai_s, config) & still)
+
+
+def _of_status(status: Status, *, is_stow_kept: bool) -> set[Cause]:
+    is_local = not status.is_remote_enabled or status.mode is AcuMode.MANUAL
+    is_stowed = status.mode in (AcuMode.STOWING, AcuMode.STOWED)
+    causes = {Cause.LOCAL_PANEL if is_local else Cause.REMOTE_AGAIN}
+    causes.add(Cause.ACU_FAULT if status.mode is AcuMode.FAULT else Cause.FAULT_GONE)
+    if is_stow_kept:
+        causes.add(Cause.STOWING)
+    if not is_stowed:
+        causes.add(Cause.STOW_LEFT)
+    return causes
+
+
+def is_acquired(status: Status) -> bool:
+    """Design section 1: AUTOTRACK with ACQ set."""
+    return status.mode is AcuMode.AUTOTRACK and status.is_acquired
+
+
+def _of_signal(state: ControlState, status: Status, sky: Sky, now_tai_s: float, config: ControlConfig) -> set[Cause]:
+    has_fit = sky.prediction is not None and sky.prediction.kind == "FITTED"
+    causes: set[Cause] = set()
+    if sky.prediction is not None:
+        causes.add(Cause.FIT if has_fit else Cause.FIT_LEFT)
+    if is_acquired(status):
+        if _is_ours(state, status, sky, now_tai_s, config):
+            causes.add(Cause.ACQUIRED_FITTED if has_fit else Cause.ACQUIRED)
+        if has_fit and state.tracking.track is TrackState.HOLD_FITTED:
+            causes.add(Cause.ACQUIRED)
+    else:
+        causes.add(Cause.LOST)
+    return causes
+
+
+def _is_ours(state: ControlState, status: Status, sky: Sky, now_tai_s: float, config: ControlConfig) -> bool:
+    """Whether what autotrack holds can be this pass: late enough, and where it was found so, near the path."""
+    if sky.plan is None or now_tai_s < sky.plan.rise_tai_s - ACQUIRE_LEAD_S:
+        return False
+    if state.tracking.track not in BEFORE:
+        return True
+    target = path_point(sky, now_tai_s)
+    if target is None or not target.is_finite:
+        return True
+    if sky.prediction is None or _distance_deg(state, status, target) < RESUME_DEG:
+        return True
+    return is_within(
+        offset_of(sky.prediction, now_tai_s, state.intake.az_deg, status.el_deg), extents(sky.prediction, config)
+    )
+
+
+def _of_plan(state: ControlState, status: Status, sky: Sky, now_tai_s: float, config: ControlConfig) -> set[Cause]:
+    plan = sky.plan
+    if plan is None:
+        return set()
+    if now_tai_s > pass_end_tai_s(plan, sky):
+        return {Cause.PASS_OVER}
+    causes: set[Cause] = set()
+    if sky.prediction is not None and now_tai_s >= plan.rise_tai_s - lead_s(plan, state, config):
+        causes.add(Cause.PASS_NEAR)
+    if state.tracking.track in BEFORE and now_tai_s >= plan.rise_tai_s - ACQUIRE_LEAD_S:
+        target = path_point(sky, now_tai_s)
+        if target is not None and target.is_finite:
+            is_in_pass = now_tai_s >= plan.rise_tai_s
+            causes |= _of_place(state, status, sky, _reached(target, state, config), config, is_in_pass=is_in_pass)
+    return causes
+
+
+def _reached(target: Pointing, state: ControlState, config: ControlConfig) -> Pointing:
+    """As near to the path as the limits of the axes allow."""
+    az_deg = nearest_turn(target.az_deg, target.az_deg, config.azimuth)
+    target = target if az_deg is None else replace(target, az_deg=az_deg)
+    return within_limits(target, state.intake.az_deg, config)[0]
+
+
+def _of_place(
+    state: ControlState, status: Status, sky: Sky, target: Pointing, config: ControlConfig, *, is_in_pass: bool
+) -> set[Cause]:
+    """How near the antenna is to the path, once a signal may come.
+
+    Not the same bearing on another turn of the wrap; but in the pass a signal from there is taken on any turn, without
+    a move first: which turn is the true one may be in doubt.
+    """
+    has_fit = sky.prediction is not None and sky.prediction.kind == "FITTED"
+    distance_deg = _distance_deg(state, status, target)
+    is_on_turn = abs(state.intake.az_deg - target.az_deg) < 90.0
+    is_there = status.mode is AcuMode.REMOTE and is_on_turn and distance_deg < ON_POINT_BEAMS * config.beamwidth_deg
+    is_heard = is_in_pass and not is_on_turn and status.is_acquired and status.mode in (AcuMode.REMOTE, AcuMode.STANDBY)
+    causes: set[Cause] = set()
+    if is_there or (is_heard and distance_deg < HEARD_BEAMS * config.beamwidth_deg):
+        causes.add(Cause.ON_POINT_FITTED if has_fit else Cause.ON_POINT)
+    if distance_deg < RESUME_DEG:
+        if has_fit:
+            causes.add(Cause.STILL_FITTED)
+        if status.is_autotrack_selected and status.follows_registers:
+            causes.add(Cause.STILL_SELECTED)
+    return causes
+
+
+def path_point(sky: Sky, tai_s: float, *, follow: bool = True) -> Pointing | None:
+    """The path at an instant; before the rise it stands still at the rise point."""
+    if sky.prediction is not None and (sky.plan is None or tai_s >= sky.plan.start_tai_s):
+        return sky.prediction.at(tai_s, follow=follow)
+    if sky.plan is not None:
+        return Pointing(sky.plan.start_az_deg, sky.plan.start_el_deg, 0.0, 0.0)
+    return None
+
+
+def _distance_deg(state: ControlState, status: Status, target: Pointing) -> float:
+    """Angle on the sky between antenna and path, less what the path moved since the reading."""
+    lag_deg = 0.15 * hypot(target.az_rate_deg_s * cos(radians(target.el_deg)), target.el_rate_deg_s)
+    return sky_angle_deg(state.intake.az_deg, status.el_deg, target.az_deg, target.el_deg) - lag_deg
+
+
+def _of_time(state: ControlState, sky: Sky, now_tai_s: float, config: ControlConfig) -> set[Cause]:
+    in_state_s = now_tai_s - state.tracking.entered_tai_s
+    causes: set[Cause] = set()
+    status = state.intake.status
+    if (
+        status is not None
+        and in_state_s > MODE_SETTLE_S
+        and not status.is_autotrack_selected
+        and status.mode in (AcuMode.STANDBY, AcuMode.REMOTE)
+    ):
+        causes.add(Cause.MODE_LEFT)
+    if state.tracking.track is TrackState.ACQUIRE_TLE and sky.plan is not None:
+        waiting_s = now_tai_s - max(state.tracking.entered_tai_s, sky.plan.rise_tai_s)
+        if waiting_s > config.acquire_s:
+            causes.add(Cause.ACQUIRE_OVER)
+    is_glimpse = (
+        state.tracking.track is TrackState.HOLD_TLE and not state.signal.has_locked
+    )  # it has shown nothing worth a long hold
+    hold_s = min(config.hold_s, config.acquire_s) if is_glimpse else config.hold_s
+    if state.tracking.track in HOLDING and now_tai_s - state.tracking.hold_from_tai_s > hold_s:
+        causes.add(Cause.HOLD_OVER)
+    if state.tracking.track is TrackState.SEARCH and in_state_s > config.search_s:
+        has_fit = sky.prediction is not None and sky.prediction.kind == "FITTED"
+        causes.add(Cause.SEARCH_OVER_FITTED if has_fit else Cause.SEARCH_OVER)
+    return causes

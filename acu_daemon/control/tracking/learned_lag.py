@@ -1,0 +1,42 @@
+"""The lag from command to encoder, learned while the antenna follows the registers.  Owner of `Lag`.  Pure.
+
+control.tracking.lag has the theory.
+"""
+
+from acu_daemon.control.changed import changed
+from acu_daemon.control.state import ControlState, Lag
+from acu_daemon.protocol.angles import LSB_DEG
+
+STEADY_SHARE = 0.1  # of a step of the registers: more change than that from one to the next is acceleration
+
+
+def learn_lag(state: ControlState, az_deg: float, el_deg: float) -> ControlState:
+    """The newest of three commands is not in force yet when the angles are sampled: learn from the one before it."""
+    if len(state.registers.commands) < 3:
+        return state
+    before, in_force, newest = state.registers.commands[-3:]
+    if before is None or in_force is None or newest is None:
+        return state
+    if not (before.is_free and in_force.is_free and newest.is_free):
+        return state
+    if not (
+        _is_steady(before.az_deg, in_force.az_deg, newest.az_deg)
+        and _is_steady(before.el_deg, in_force.el_deg, newest.el_deg)
+    ):
+        return state
+    lag = Lag(
+        az=state.lag.az.seen(in_force.az_deg - before.az_deg, in_force.az_deg - az_deg),
+        el=state.lag.el.seen(in_force.el_deg - before.el_deg, in_force.el_deg - el_deg),
+    )
+    return changed(state, lag=lag)
+
+
+def forget_lag(state: ControlState) -> ControlState:
+    """Of an axis that failed nothing is kept."""
+    return changed(state, lag=Lag())
+
+
+def _is_steady(before_deg: float, in_force_deg: float, newest_deg: float) -> bool:
+    """Whether an axis moves at a nearly constant rate, so that what it is short of is lag, not acceleration."""
+    step_deg, next_deg = in_force_deg - before_deg, newest_deg - in_force_deg
+    return abs(next_deg - step_deg) < STEADY_SHARE * abs(step_deg) + 2 * LSB_DEG

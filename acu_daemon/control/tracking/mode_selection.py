@@ -1,0 +1,29 @@
+"""Which mode or backup the present state needs: judged by the status, so a command repeats until it shows."""
+
+from acu_daemon.control.state import ControlState
+from acu_daemon.control.tracking.state_table import AUTOTRACKING, HOLDING, TrackState
+from acu_daemon.protocol.messages import AcuMode, Backup, Command, SelectBackup, SelectMode
+
+STANDBY = SelectMode(AcuMode.STANDBY)  # the one mode command that the ACU takes in STOWED, ICD section 5
+UNDER_AUTOTRACK = AUTOTRACKING | HOLDING | {TrackState.ACQUIRE_TLE, TrackState.SEARCH}
+
+
+def wanted_mode_command(state: ControlState, *, is_settled: bool) -> Command | None:
+    """The next command on the way to what the state needs; None when the ACU is there.
+
+    The backup comes before the mode, and the registers are written before either (ICD section 5).
+    is_settled: nothing was commanded for a while, so that what the status says of the mode is no transient.
+    """
+    status = state.intake.status
+    if status is None:
+        return None
+    if state.tracking.track is not TrackState.PREPOSITION and state.tracking.track not in UNDER_AUTOTRACK:
+        return None
+    is_stuck = status.mode is AcuMode.STANDBY and status.is_autotrack_selected  # selected again, it would not change
+    if status.mode is AcuMode.STOWED or (is_stuck and is_settled):
+        return STANDBY
+    if status.backup_selected is not Backup.REMOTE:
+        return SelectBackup(Backup.REMOTE)
+    if state.tracking.track is TrackState.PREPOSITION:
+        return SelectMode(AcuMode.REMOTE) if status.mode is not AcuMode.REMOTE else None
+    return SelectMode(AcuMode.AUTOTRACK) if not status.is_autotrack_selected else None

@@ -1,0 +1,93 @@
+"""The plan of a pass: where to stand, on which turn of the wrap, when it is due, and when the pass ends.  Pure."""
+
+from math import isfinite
+
+import numpy as np
+
+from acu_daemon.control.state import ControlState
+from acu_daemon.control.tick_input import PassPlan, Sky
+from acu_daemon.control.tracking.approach import ACQUIRE_LEAD_S
+from acu_daemon.control.tracking.state_table import AUTOTRACKING
+from acu_daemon.model import AxisLimits, Pass, Site
+from acu_daemon.orbit.look import look_at
+from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.pointing.reach import OutOfReach, out_of_reach
+from acu_daemon.pointing.wrap import choose_turn, middle_deg
+
+COARSE_STEP_S, MOST_STEPS = 0.5, 20000  # of these a tenth of a second's work, in the loop
+ANY_ELEVATION = AxisLimits(-90.0, 180.0, 1.0, 1.0)
+STEP_S = 0.25  # fine enough to unwrap the azimuth of a pass 0.1 deg from the zenith
+
+
+def plan_pass(
+    propagator: Propagator,
+    site: Site,
+    coming: Pass,
+    present_az_deg: float,
+    azimuth: AxisLimits,
+    now_tai_s: float,
+    *,
+    elevation: AxisLimits = ANY_ELEVATION,
+    learned_count: int = 0,
+) -> PassPlan:
+    """Choose the turn that holds what is left of the pass, and the point where the antenna waits for it.
+
+    present_az_deg: where the antenna stands, continuous azimuth in the encoder frame.
+    learned_count: turns of the azimuth that were learned so far.
+    """
+    start_tai_s = min(max(coming.rise_tai_s, now_tai_s), coming.set_tai_s - 1.0)
+    step_s = max(STEP_S, (coming.set_tai_s - start_tai_s) / MOST_STEPS)  # one that does not set lasts for days
+    tai_s = np.arange(start_tai_s, coming.set_tai_s + step_s, step_s)
+    look = look_at(propagator, tai_s, site)
+    az_deg = np.degrees(np.unwrap(np.radians(look.az_deg)))
+    turn = choose_turn(az_deg, look.el_deg, azimuth, present_az_deg)
+    return PassPlan(
+        rise_tai_s=coming.rise_tai_s,
+        set_tai_s=coming.set_tai_s,
+        start_tai_s=start_tai_s,
+        start_az_deg=float(az_deg[0]) + turn.offset_deg,
+        start_el_deg=float(look.el_deg[0]),
+        note="" if turn.holds_path else turn.reason,
+        beyond=out_of_reach(tai_s, az_deg + turn.offset_deg, look.el_deg, azimuth, elevation),
+        learned_count=learned_count,
+    )
+
+
+def beyond_limits(
+    propagator: Propagator, site: Site, coming: Pass, azimuth: AxisLimits, elevation: AxisLimits
+) -> tuple[OutOfReach, ...]:
+    """When which axis cannot follow a pass, for an antenna that waits for it in the middle of its range."""
+    step_s = max(COARSE_STEP_S, coming.duration_s / MOST_STEPS)
+    tai_s = np.arange(coming.rise_tai_s, coming.set_tai_s, step_s)
+    look = look_at(propagator, tai_s, site)
+    az_deg = np.degrees(np.unwrap(np.radians(look.az_deg)))
+    turn = choose_turn(az_deg, look.el_deg, azimuth, middle_deg(azimuth))
+    return out_of_reach(tai_s, az_deg + turn.offset_deg, look.el_deg, azimuth, elevation)
+
+
+def is_due(plan: PassPlan | None, state: ControlState) -> bool:
+    """Whether a plan is to be made: as soon as the antenna is seen, and anew for a turn that was learned."""
+    if state.intake.status is None:
+        return False
+    return plan is None or plan.learned_count != state.turn.learned_count
+
+
+def pass_end_tai_s(plan: PassPlan, sky: Sky) -> float:
+    """The end of the pass: its set by the elements, shifted by what the fit found, early or late."""
+    along_s = sky.fit.along_s if sky.fit and isfinite(sky.fit.along_s) else 0.0
+    return plan.set_tai_s + along_s + 1.0
+
+
+def is_tracked(state: ControlState, sky: Sky, now_tai_s: float) -> bool:
+    """Whether this pass is held, or has been: then what was seen of it counts for more than another clock."""
+    plan = sky.plan
+    is_in_pass = plan is not None and plan.rise_tai_s - ACQUIRE_LEAD_S <= now_tai_s <= pass_end_tai_s(plan, sky)
+    return state.tracking.track in AUTOTRACKING or sky.fit is not None or (is_in_pass and state.signal.has_acquired)
+
+
+def why_over(sky: Sky, now_tai_s: float, end_tai_s: float) -> str:
+    """Why the run ends by itself; empty: it does not.  end_tai_s: the time that it may last."""
+    if now_tai_s >= end_tai_s:
+        return "duration over"
+    is_over = sky.plan is not None and now_tai_s > pass_end_tai_s(sky.plan, sky)
+    return "pass over" if is_over else ""

@@ -1,0 +1,96 @@
+"""What autotrack tells of the path before there is a fit, and what it tells of the satellite at all.  Pure.
+
+Only what is held while the table says that it is this pass's satellite counts; another pass knows nothing of it.
+Owner of `Signal`.
+"""
+
+from dataclasses import replace
+from math import isfinite
+
+from acu_daemon.control.changed import changed
+from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.orders import Event
+from acu_daemon.control.state import ControlState, PathOffset, Signal
+from acu_daemon.control.tick_input import Observation, Sky
+from acu_daemon.control.tracking.causes import is_acquired
+from acu_daemon.control.tracking.search import forget_search
+from acu_daemon.control.tracking.state_table import AUTOTRACKING, TrackState
+from acu_daemon.control.tracking.track_frame import beside, extents, is_within, offset_of
+from acu_daemon.model import Pointing, Reading
+
+GAIN = 0.6  # of the newest reading in the smoothed offset: autotrack pulls in quickly
+
+
+def drop_unusable_offset(state: ControlState, refused: str) -> tuple[ControlState, str]:
+    """An offset that is not finite carries no path.  refused: what else of a tick's input is not finite."""
+    offset = state.signal.offset
+    if offset is None or isfinite(offset.along_s + offset.across_deg):
+        return state, refused
+    return changed(state, signal=changed(state.signal, offset=None)), "offset"
+
+
+def forget_other_pass(state: ControlState, sky: Sky) -> ControlState:
+    """What was learned of a satellite in another pass is not this one's."""
+    signal = state.signal
+    if sky.plan is None or sky.plan.rise_tai_s == signal.pass_rise_tai_s:
+        return state
+    if signal.pass_rise_tai_s is not None:
+        state, signal = forget_search(state), Signal(is_offset_refused=signal.is_offset_refused)
+    return changed(state, signal=changed(signal, pass_rise_tai_s=sky.plan.rise_tai_s))
+
+
+def resume_pass(state: ControlState) -> ControlState:
+    """The pass was acquired before the daemon was started again."""
+    return changed(state, signal=changed(state.signal, has_acquired=True))
+
+
+def learn_of_signal(
+    state: ControlState, seen: Observation, sky: Sky, config: ControlConfig, events: list[Event]
+) -> ControlState:
+    """Take a reading of the satellite's own signal, by the state that the table has just given."""
+    if seen.status is None or seen.reading is None:
+        return state
+    signal, track, tai_s = state.signal, state.tracking.track, seen.reading.tai_s
+    if not is_acquired(seen.status) or track not in AUTOTRACKING:
+        if signal.acquired_since_tai_s is None:
+            return state
+        return changed(state, signal=changed(signal, acquired_since_tai_s=None))
+    since_tai_s = signal.acquired_since_tai_s or tai_s
+    has_locked = signal.has_locked or tai_s - since_tai_s >= config.lock_dwell_s
+    new = replace(signal, acquired_since_tai_s=since_tai_s, has_acquired=True, has_locked=has_locked)
+    if track is TrackState.AUTOTRACK_TLE and seen.is_in_step:
+        new = _learn_offset(new, seen.reading, sky, config, events)
+    return changed(state, signal=new)
+
+
+def _learn_offset(signal: Signal, reading: Reading, sky: Sky, config: ControlConfig, events: list[Event]) -> Signal:
+    """Follow the distance between reading and prediction: it carries the path until the first fit."""
+    prediction = sky.prediction
+    new = offset_of(prediction, reading.tai_s, reading.az_deg, reading.el_deg) if prediction is not None else None
+    if prediction is None or new is None:
+        return signal
+    most_along_s, most_across_deg = extents(prediction, config)
+    if not is_within(new, (most_along_s, most_across_deg)):
+        if not signal.is_offset_refused:
+            fields = {
+                "along_s": round(new[0], 1),
+                "across_deg": round(new[1], 2),
+                "most_along_s": round(most_along_s, 1),
+                "most_across_deg": round(most_across_deg, 2),
+            }
+            events.append(Event("offset.refused", fields, is_warning=True))
+        return changed(signal, is_offset_refused=True)
+    old = signal.offset
+    if old is not None and old.model is prediction.model:
+        new = old.along_s + GAIN * (new[0] - old.along_s), old.across_deg + GAIN * (new[1] - old.across_deg)
+    return changed(signal, offset=PathOffset(*new, prediction.model), is_offset_refused=False)
+
+
+def learned_point(state: ControlState, sky: Sky, tai_s: float, *, follow: bool) -> Pointing | None:
+    """The path as autotrack showed it before the first fit; None: as it is predicted."""
+    offset, prediction = state.signal.offset, sky.prediction
+    if offset is None or prediction is None or offset.model is not prediction.model:
+        return None
+    if state.tracking.track not in (TrackState.AUTOTRACK_TLE, TrackState.HOLD_TLE):
+        return None
+    return beside(prediction, tai_s, (offset.along_s, offset.across_deg), follow=follow)

@@ -1,0 +1,130 @@
+"""The states of tracking and the one table of their transitions (design section 4).
+
+A state is named by what steers and what would take over.  `transition` walks TABLE from the top: the first row whose
+sources hold the present state and whose cause is present wins.  Causes are found in control.tracking.causes.
+"""
+
+from collections.abc import Set
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class TrackState(StrEnum):
+    """What steers the antenna, and what would take over."""
+
+    IDLE = "IDLE"
+    PREPOSITION = "PREPOSITION"
+    ACQUIRE_TLE = "ACQUIRE/TLE"
+    AUTOTRACK_TLE = "AUTOTRACK/TLE"
+    AUTOTRACK_FITTED = "AUTOTRACK/FITTED"
+    HOLD_FITTED = "HOLD/FITTED"
+    HOLD_TLE = "HOLD/TLE"
+    SEARCH = "SEARCH"
+    MANUAL = "MANUAL"
+    STOW = "STOW"
+    FAULT = "FAULT"
+    LINK_LOST = "LINK-LOST"
+
+
+class Cause(StrEnum):
+    """Why a state changes, in the words an operator reads."""
+
+    LINK_SILENT = "no valid reply from the ACU"
+    LINK_BACK = "the ACU answers"
+    LATCHED = "an axis does not do what it is told: latched until a person clears it"
+    HANDS_OFF = "not armed, and nobody has selected autotrack"
+    LOCAL_PANEL = "the local panel took control"
+    REMOTE_AGAIN = "remote control is back"
+    ACU_FAULT = "the ACU reports a fault"
+    FAULT_GONE = "the fault is cleared"
+    STOWING = "the ACU stows the antenna"
+    STOW_LEFT = "the ACU left the stow position"
+    PASS_NEAR = "the pass is near"
+    PASS_OVER = "the pass is over"
+    ON_POINT = "the antenna stands on the predicted path"
+    ON_POINT_FITTED = "the antenna stands on the path of this pass's fit"
+    STILL_SELECTED = "autotrack is still selected, near the predicted path"
+    STILL_FITTED = "interrupted in mid-pass, and a fit of this pass exists"
+    ACQUIRED = "the signal is acquired"
+    ACQUIRED_FITTED = "the signal is acquired and a fit of this pass exists"
+    FIT = "a fit was accepted"
+    FIT_LEFT = "newer readings deny the fit: the prediction is made from the elements again"
+    LOST = "the signal is lost"
+    MODE_LEFT = "the ACU left the mode by itself (power cycle, or another hand)"
+    ACQUIRE_OVER = "no signal within acquire_s"
+    HOLD_OVER = "no signal within hold_s"
+    SEARCH_OVER = "no signal within search_s"
+    SEARCH_OVER_FITTED = "no signal within search_s around this pass's fit"
+
+
+S = TrackState
+ACTIVE = frozenset(
+    {S.PREPOSITION, S.ACQUIRE_TLE, S.AUTOTRACK_TLE, S.AUTOTRACK_FITTED, S.HOLD_FITTED, S.HOLD_TLE, S.SEARCH}
+)
+TRACKING = ACTIVE - {S.PREPOSITION}
+HOLDING = frozenset({S.HOLD_FITTED, S.HOLD_TLE})
+AUTOTRACKING = frozenset({S.AUTOTRACK_TLE, S.AUTOTRACK_FITTED})
+ANY = frozenset(TrackState)
+NO_LINK = frozenset({S.LINK_LOST})
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One line of the table; `limit` names the key of the satellite's TOML, or the rule, that sets its time."""
+
+    sources: Set[TrackState]
+    cause: Cause
+    target: TrackState
+    limit: str = "at once"
+
+
+TABLE: tuple[Row, ...] = (
+    Row(ANY - NO_LINK, Cause.LINK_SILENT, S.LINK_LOST, "0.5 s without a valid reply"),
+    Row(NO_LINK, Cause.LINK_BACK, S.IDLE, "first good poll"),
+    Row(ANY - NO_LINK - {S.FAULT}, Cause.LATCHED, S.FAULT),
+    Row(ANY - NO_LINK - {S.MANUAL}, Cause.LOCAL_PANEL, S.MANUAL),
+    Row(frozenset({S.MANUAL}), Cause.REMOTE_AGAIN, S.IDLE),
+    Row(ANY - NO_LINK - {S.MANUAL, S.FAULT}, Cause.ACU_FAULT, S.FAULT),
+    Row(frozenset({S.FAULT}), Cause.FAULT_GONE, S.IDLE),
+    Row(ANY - NO_LINK - {S.MANUAL, S.FAULT, S.STOW}, Cause.STOWING, S.STOW),
+    Row(frozenset({S.STOW}), Cause.STOW_LEFT, S.IDLE),
+    Row(ACTIVE, Cause.PASS_OVER, S.IDLE, "set of the pass"),
+    Row(ACTIVE, Cause.HANDS_OFF, S.IDLE),
+    Row(frozenset({S.IDLE, S.PREPOSITION}), Cause.ACQUIRED_FITTED, S.AUTOTRACK_FITTED),
+    Row(frozenset({S.IDLE, S.PREPOSITION}), Cause.ACQUIRED, S.AUTOTRACK_TLE),
+    Row(frozenset({S.IDLE}), Cause.STILL_FITTED, S.HOLD_FITTED),
+    Row(frozenset({S.IDLE}), Cause.STILL_SELECTED, S.ACQUIRE_TLE),
+    Row(
+        frozenset({S.IDLE}),
+        Cause.PASS_NEAR,
+        S.PREPOSITION,
+        "before the rise: preposition_s, or as the way takes",
+    ),
+    Row(frozenset({S.PREPOSITION}), Cause.ON_POINT_FITTED, S.HOLD_FITTED),
+    Row(frozenset({S.PREPOSITION}), Cause.ON_POINT, S.ACQUIRE_TLE, "20 s before the rise or later"),
+    Row(TRACKING, Cause.MODE_LEFT, S.IDLE),
+    Row(frozenset({S.AUTOTRACK_FITTED}), Cause.FIT_LEFT, S.AUTOTRACK_TLE),
+    Row(frozenset({S.HOLD_FITTED}), Cause.FIT_LEFT, S.HOLD_TLE),
+    Row(frozenset({S.ACQUIRE_TLE, S.SEARCH}), Cause.ACQUIRED_FITTED, S.AUTOTRACK_FITTED),
+    Row(frozenset({S.ACQUIRE_TLE, S.SEARCH, S.HOLD_TLE}), Cause.ACQUIRED, S.AUTOTRACK_TLE),
+    Row(frozenset({S.ACQUIRE_TLE}), Cause.ACQUIRE_OVER, S.SEARCH, "acquire_s after the rise"),
+    Row(frozenset({S.AUTOTRACK_FITTED}), Cause.LOST, S.HOLD_FITTED),
+    Row(frozenset({S.AUTOTRACK_TLE}), Cause.LOST, S.HOLD_TLE),
+    Row(frozenset({S.AUTOTRACK_TLE}), Cause.FIT, S.AUTOTRACK_FITTED, "lock_dwell_s and the first fit"),
+    Row(frozenset({S.HOLD_FITTED}), Cause.ACQUIRED, S.AUTOTRACK_FITTED),
+    Row(frozenset({S.HOLD_TLE, S.ACQUIRE_TLE}), Cause.FIT, S.HOLD_FITTED, "a fit that ends just after the loss"),
+    Row(HOLDING, Cause.HOLD_OVER, S.SEARCH, "hold_s after 3 sigma left the beam, or the loss; never locked: acquire_s"),
+    Row(frozenset({S.SEARCH}), Cause.SEARCH_OVER_FITTED, S.HOLD_FITTED, "search_s"),
+    Row(frozenset({S.SEARCH}), Cause.SEARCH_OVER, S.HOLD_TLE, "search_s"),
+)
+
+
+_ROWS = {state: tuple(row for row in TABLE if state in row.sources) for state in TrackState}
+
+
+def transition(state: TrackState, causes: Set[Cause]) -> tuple[TrackState, Cause] | None:
+    """The next state and its cause, or None when nothing changes."""
+    for row in _ROWS[state]:
+        if row.cause in causes:
+            return row.target, row.cause
+    return None
