@@ -207,6 +207,15 @@ def test_the_beam_of_an_offset_boresight_is_put_on_the_target() -> None:
     assert angles_between_deg(beam_direction(aimed(p, cone), cone.boresight), p).max() < 1e-6
 
 
+def test_a_free_profile_that_backlash_spoils_is_not_sent_to_the_free_method(tmp_path: Path) -> None:
+    change = ("azimuth_deg = 0.01\nelevation_deg = 0.01", "azimuth_deg = 1.0\nelevation_deg = 1.0")
+    failed = onboard("profile", pass_file(tmp_path, change), "--out", tmp_path / "a.tpf")
+    assert failed.returncode == 1
+    assert "FAIL elevation acceleration" in failed.stdout
+    assert failed.stderr.endswith("no file is written: change [antenna] in the pass' file\n")
+    assert not (tmp_path / "a.tpf").exists()
+
+
 def test_backlash_is_led_in_the_direction_of_the_motion() -> None:
     knots = Knots(np.array([0.0, 20.0, 40.0]))
     path = knots.path(np.array([0.0, 20.0, 0.0, 10.0, 0.0, -20.0, 0.0, -20.0, 0.0]))
@@ -268,7 +277,8 @@ def test_what_is_wrong_with_a_pass_is_told_with_what_to_change(
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (("max_deg = 110.0", "max_deg = 60.0"), "beyond the elevation range of 60 deg"),
+        (("max_deg = 110.0", "max_deg = 60.0"), "beyond the elevation range from 0 to 60 deg"),
+        (("min_deg = 0.0", "min_deg = 20.0"), "the station is only 7.0 deg from the gimbal's axis"),
         (("max_deg = 270.0", "max_deg = -150.0"), "widen the range or the margin"),
         (("max_acceleration_deg_s2 = 2.0", "max_acceleration_deg_s2 = 0.01"), "raise max_acceleration_deg_s2"),
     ],

@@ -71,9 +71,10 @@ def profile(
         _draw(plot, planned, task, made)
     if not made.is_met:
         failed = ", ".join(check.name for check in made.second if not check.is_met)
+        way = "change" if wanted.method == "free" else "--method free plans within margin and limits, or change"
         raise ProfileError(
-            f"the profile of method {wanted.method} fails: {failed}; no file is written.  --method free plans within "
-            "margin and limits, or change [antenna] in the pass' file"
+            f"the profile of method {wanted.method} fails: {failed}; no file is written: {way} [antenna] in the pass' "
+            "file"
         )
     if out is not None:
         about = {"PASS": pass_file.name, **header(planned, task, made, wanted.objective)}

@@ -82,14 +82,19 @@ def _led(task: Task, profile: Profile, backlash: Backlash) -> Profile:
 def refuse_out_of_reach(task: Task) -> None:
     """ProfileError: the station is beyond elevation's range by more than the margin for a part of the pass."""
     el_deg = task.station_gimbal(task.view).el_deg - task.cone.boresight_elevation_deg  # the motor's
-    is_out = el_deg > task.elevation.max_deg + task.margin_deg
-    if is_out.any():
-        times = task.view.tai_s[is_out]
-        raise ProfileError(
-            f"the station is up to {el_deg.max():.1f} deg from the gimbal's axis, beyond the elevation range of "
-            f"{task.elevation.max_deg:g} deg and the margin, from {utc_text(float(times[0]))} to "
-            f"{utc_text(float(times[-1]))}: turn the satellite less then, raise min_elevation_deg, or change the mount"
-        )
+    low_deg, high_deg = task.elevation.min_deg, task.elevation.max_deg
+    for is_out, word, nearest_deg in (
+        (el_deg > high_deg + task.margin_deg, "up to", el_deg.max()),
+        (el_deg < low_deg - task.margin_deg, "only", el_deg.min()),
+    ):
+        if is_out.any():
+            times = task.view.tai_s[is_out]
+            raise ProfileError(
+                f"the station is {word} {nearest_deg:.1f} deg from the gimbal's axis, beyond the elevation range from "
+                f"{low_deg:g} to {high_deg:g} deg and the margin, from {utc_text(float(times[0]))} to "
+                f"{utc_text(float(times[-1]))}: turn the satellite otherwise then, raise min_elevation_deg, or change "
+                "the mount"
+            )
 
 
 def why_not(task: Task, spare_deg: float = 0.0) -> str:
