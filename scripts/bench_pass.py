@@ -34,7 +34,7 @@ from tables.outputs import output_file
 from acu_daemon.cli.options import load_target
 from acu_daemon.errors import AcuDaemonError
 from acu_daemon.orbit.timescales import utc_text
-from acu_daemon.report.trace import read_trace
+from acu_daemon.report.pass_trace import read_trace
 from acu_daemon.report.wire import LossFigures, WriteFigures, measure_losses, measure_writes, read_writes
 
 MIN_WINDOW_S = 45.0

@@ -17,7 +17,7 @@ import structlog
 
 with atheris.instrument_imports(include=["acu_daemon"]):
     from acu_daemon.config.load import load_satellite, load_station
-    from acu_daemon.edge.carry_over import read_carry_over
+    from acu_daemon.edge.carry_over_file import read_carry_over
     from acu_daemon.edge.elements_file import load_elements
     from acu_daemon.edge.recording import read_readings
     from acu_daemon.errors import AttitudeError, ConfigError, ElementsError, UsageError

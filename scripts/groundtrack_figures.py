@@ -21,15 +21,15 @@ from acu_daemon.edge.campaign import progress_bar, results_of, run_campaign
 from acu_daemon.edge.flux_file import load_flux
 from acu_daemon.edge.tesserals import Forces, integrate, ripple_of
 from acu_daemon.groundtrack.atmosphere import Activity, density_table, exospheric_k, semi_annual
-from acu_daemon.groundtrack.elements import MeanElements, mean_of, states_of
+from acu_daemon.groundtrack.control_loop import BLOCK_STEPS
 from acu_daemon.groundtrack.environment import EPOCH_TAI_S, Spacecraft, even_steps, free_motion, node_rad
-from acu_daemon.groundtrack.gps import FIX_S, FIXES, NO_STEERING, Receiver, Ripple, TrueOrbit, displaced
-from acu_daemon.groundtrack.loop import BLOCK_STEPS
+from acu_daemon.groundtrack.gps import FIX_S, FIXES, NO_STEERING, GpsReceiver, Ripple, TrueOrbit, displaced
 from acu_daemon.groundtrack.lunisolar import sun
+from acu_daemon.groundtrack.mean_elements import MeanElements, mean_of, states_of
 from acu_daemon.groundtrack.navigator import Navigator, NavigatorSetup, drift_of
 from acu_daemon.groundtrack.paper_navigator import PaperNavigator, offsets_of
 from acu_daemon.groundtrack.polynomials import fit_polynomials
-from acu_daemon.groundtrack.simulate import Case, Outcome, World, drag_less_lunisolar_m, make_world, simulate
+from acu_daemon.groundtrack.simulate import Case, CaseOutcome, World, drag_less_lunisolar_m, make_world, simulate
 from acu_daemon.orbit.timescales import gmst_rad
 from acu_daemon.units import DAY_S, DEG, Array
 
@@ -119,7 +119,7 @@ def navigator(days: float = 6.0) -> None:
     """Raw fixes, the paper's navigator, ours: position in three dimensions, and D; the truth has tesserals to 20."""
     tables = {degree: _ripple(degree) for degree in (20, 12)}
     free = free_motion(CRAFT, days, load_flux("moderate"), has_semi_annual=True)
-    orbit, receiver = TrueOrbit(free, NODE_RAD, tables[20]), Receiver(days, np.random.default_rng(1))
+    orbit, receiver = TrueOrbit(free, NODE_RAD, tables[20]), GpsReceiver(days, np.random.default_rng(1))
     times_s = even_steps(FIX_S, FIX_S, int(days * DAY_S / FIX_S))
     r_m, v_m_s = orbit.states(times_s, NO_STEERING)
     fixes_m = r_m + receiver.errors_m(times_s)
@@ -172,11 +172,11 @@ def ours(seeds: int, jobs: int | None) -> None:
         say(f"{profile} +-{band_m:g} m{', air 10 % off' if sigma else ''}: {_summary(outcomes)}")
 
 
-def _simulate(worlds: dict[str, World], case: Case) -> Outcome:
+def _simulate(worlds: dict[str, World], case: Case) -> CaseOutcome:
     return simulate(worlds[case.profile], case)
 
 
-def _summary(outcomes: list[Outcome]) -> str:
+def _summary(outcomes: list[CaseOutcome]) -> str:
     counts = [len(one.flown.manoeuvres) for one in outcomes]
     late = [one.flown.d_m[one.flown.times_s > SETTLED_DAYS * DAY_S] for one in outcomes]
     balance = [float(one.flown.sizes_m.sum()) / drag_less_lunisolar_m(one.free) - 1.0 for one in outcomes]

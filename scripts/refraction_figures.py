@@ -36,7 +36,7 @@ from acu_daemon.pointing.air import Air, refractivity, standard_air
 from acu_daemon.pointing.antenna_model import AntennaModel
 from acu_daemon.pointing.mount import Mount
 from acu_daemon.pointing.refraction import SCALE_HEIGHT_M, curvature_radius_m, traced
-from acu_daemon.sim.air import simulated_air
+from acu_daemon.sim.shell_air import simulated_air
 from acu_daemon.units import DEG
 
 ELEVATIONS_DEG = (0.0, 1.0, 5.0, 10.0, 30.0)

@@ -6,7 +6,7 @@ from acu_daemon.model import AxisLimits
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.scenario import AcuChoice, Scenario
-from acu_daemon.sim.sky import Direction, Sky
+from acu_daemon.sim.sky import Direction, SimulatedSky
 
 AZIMUTH = AxisLimits(-270.0, 270.0, 20.0, 10.0)
 ELEVATION = AxisLimits(0.0, 90.0, 5.0, 5.0)
@@ -33,7 +33,7 @@ class Star:
 class Bench:
     """A FakeAcu with its time."""
 
-    def __init__(self, sky: Sky | None = None, scenario: Scenario | None = None, **parts: object) -> None:
+    def __init__(self, sky: SimulatedSky | None = None, scenario: Scenario | None = None, **parts: object) -> None:
         self.sky = sky if sky is not None else Star()
         scenario = scenario or Scenario(acu=AcuChoice(azimuth_deg=30.0, elevation_deg=40.0))
         values: dict[str, object] = {"azimuth": AZIMUTH, "elevation": ELEVATION, "beamwidth_deg": 1.0, **parts}

@@ -9,7 +9,7 @@ import numpy as np
 
 import acu_daemon.cli as cli
 from acu_daemon.cli.options import Target, coming_pass, load_target
-from acu_daemon.cli.virtual_pass import Flight, Stage, fly
+from acu_daemon.cli.virtual_pass import Flight, ScriptAccess, fly
 from acu_daemon.model import Pass, sky_angle_deg
 from acu_daemon.orbit.brouwer import BrouwerPropagator
 from acu_daemon.orbit.timescales import gmst_rad, tai_from_utc
@@ -17,7 +17,7 @@ from acu_daemon.protocol.messages import Command, SelectBackup, SelectMode, Writ
 from acu_daemon.sim.build import make_sky
 from acu_daemon.sim.fault_verbs import parse_fault
 from acu_daemon.sim.scenario import AcuChoice, Encoder, Loss, ReceiverChoice, Scenario, SkyErrors
-from acu_daemon.sim.sky import Sky
+from acu_daemon.sim.sky import SimulatedSky
 from acu_daemon.sim.trace import TraceRow
 from acu_daemon.units import wrap_180
 
@@ -32,7 +32,7 @@ EFFECT_S = 0.020  # start of a write to the moment it takes effect, on TCP: docs
 LSB_DEG = 360.0 / 65536
 ORDERS = (WriteAndPoll, WriteRegisters, SelectMode, SelectBackup, WriteParameter)
 
-Script = Sequence[tuple[float, Callable[[Stage], None]]]
+Script = Sequence[tuple[float, Callable[[ScriptAccess], None]]]
 
 
 def demo_target(**sections: dict[str, Any]) -> Target:
@@ -76,7 +76,7 @@ def flight_of(
     faults: Iterable[str] = (),
     errors: SkyErrors = WRONG_ORBIT,
     noise_deg: float = NOISE_DEG,
-    sky: Sky | None = None,
+    sky: SimulatedSky | None = None,
     receiver: ReceiverChoice | None = None,
     **parts: Any,
 ) -> Flight:
@@ -105,7 +105,7 @@ def climb(duration_s: float, target: Target | None = None, **changes: Any) -> Fl
     return flight_of(target or demo_target(), RISING_TAI_S, duration_s, **{"antenna": RISING_ANTENNA, **changes})
 
 
-def sky_of(target: Target, errors: SkyErrors = WRONG_ORBIT) -> Sky:
+def sky_of(target: Target, errors: SkyErrors = WRONG_ORBIT) -> SimulatedSky:
     """Where the satellite really is."""
     return make_sky(target.elements.propagator, target.station.site, Scenario(sky=errors))
 
@@ -151,7 +151,7 @@ def events_named(flight: Flight, name: str) -> list[dict[str, Any]]:
     return [event for event in flight.events if event["event"] == name]
 
 
-def register_errors_deg(flight: Flight, sky: Sky, from_tai_s: float, to_tai_s: float) -> list[float]:
+def register_errors_deg(flight: Flight, sky: SimulatedSky, from_tai_s: float, to_tai_s: float) -> list[float]:
     """Registers against the satellite at the moment each write takes effect."""
     errors = []
     for tai_s, command in flight.commands:

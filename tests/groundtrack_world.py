@@ -5,8 +5,8 @@ from functools import lru_cache
 import numpy as np
 
 from acu_daemon.edge.flux_file import load_flux
-from acu_daemon.groundtrack.elements import MeanElements, mean_of, states_of
 from acu_daemon.groundtrack.environment import EPOCH_TAI_S, Spacecraft, node_rad
+from acu_daemon.groundtrack.mean_elements import MeanElements, mean_of, states_of
 from acu_daemon.groundtrack.simulate import World, make_world
 from acu_daemon.units import Array
 

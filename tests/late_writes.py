@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from acu_daemon.report.trace import Trace
+from acu_daemon.report.pass_trace import Trace
 from acu_daemon.report.wire import PERIOD_S, Writes
 from acu_daemon.units import DEG
 

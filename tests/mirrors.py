@@ -12,7 +12,7 @@ import numpy as np
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Sky
 from acu_daemon.model import AxisLimits, FitResult, Prediction, Reading
-from acu_daemon.protocol.messages import Registers, Status, WriteAndPoll, WriteRegisters
+from acu_daemon.protocol.messages import RegisterContents, Status, WriteAndPoll, WriteRegisters
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Mirror:
         """A command, or a reply."""
         if isinstance(message, WriteAndPoll | WriteRegisters):
             return replace(message, az_deg=self.az_deg(message.az_deg), el_deg=self.el * message.el_deg)
-        if isinstance(message, Registers):
+        if isinstance(message, RegisterContents):
             return replace(message, az_deg=self.az_deg(message.az_deg) % 360.0, el_deg=self.el * message.el_deg)
         return message
 

@@ -18,7 +18,7 @@ import structlog
 from flights import NOISE_DEG, RISING_ANTENNA, RISING_TAI_S, WRONG_ORBIT, demo_target, sky_of, the_pass
 from promise_judge import Judge
 
-import acu_daemon.edge.carry_over as carry_over_file
+import acu_daemon.edge.carry_over_file as carry_over_file
 import acu_daemon.edge.clock as clock_file
 import acu_daemon.edge.run_state as run_state_file
 from acu_daemon.assist.session.refit import RefitReply, RefitRequest, RefitSetup
@@ -41,7 +41,7 @@ from acu_daemon.sim.fault_verbs import parse_fault
 from acu_daemon.sim.memory import MemoryLink
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.scenario import AcuChoice, Encoder, Scenario
-from acu_daemon.sim.sky import Sky
+from acu_daemon.sim.sky import SimulatedSky
 from acu_daemon.sim.virtual import VirtualTimeLoop
 
 STALL_LEAD_S = 0.001
@@ -55,7 +55,7 @@ class Scene:
     """Where and when."""
 
     target: Target
-    sky: Sky
+    sky: SimulatedSky
     begin_tai_s: float
     antenna: AcuChoice
     coming: Pass

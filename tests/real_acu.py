@@ -15,7 +15,7 @@ from acu_daemon.protocol.messages import (
     Poll,
     ReadParameter,
     ReadRegisters,
-    Registers,
+    RegisterContents,
     Reply,
     Status,
 )
@@ -31,7 +31,7 @@ def answer(command: Command) -> Reply:
         case Poll():
             return STANDING
         case ReadRegisters():
-            return Registers(STANDING.az_deg, STANDING.el_deg, 0, 0)
+            return RegisterContents(STANDING.az_deg, STANDING.el_deg, 0, 0)
         case ReadParameter(name):
             return Parameter(name, 0)
     return Ack()

@@ -15,11 +15,11 @@ from acu_daemon.model import sky_angle_deg
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 from acu_daemon.pointing.air import Air
 from acu_daemon.protocol.messages import AcuMode, SelectMode
-from acu_daemon.sim.air import simulated_air
 from acu_daemon.sim.apparent_sky import ApparentSky, make_air
 from acu_daemon.sim.build import StationAir, make_sky
 from acu_daemon.sim.mount_axes import MountAxes
 from acu_daemon.sim.scenario import AcuChoice, AirChoice, Drift, Encoder, Scenario, SkyErrors
+from acu_daemon.sim.shell_air import simulated_air
 from acu_daemon.sim.sky import read_truth
 
 WEATHER = Air(1000.0, 20.0, 70.0)

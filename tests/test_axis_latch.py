@@ -17,7 +17,7 @@ from flights import (
     worst_error_deg,
 )
 
-from acu_daemon.cli.virtual_pass import Flight, Stage
+from acu_daemon.cli.virtual_pass import Flight, ScriptAccess
 from acu_daemon.control.safety.command_permit import READS
 from acu_daemon.protocol.messages import (
     AcuMode,
@@ -49,7 +49,7 @@ def says(line: str):
 def acu_hears(*commands: Command):
     """What another hand tells the ACU."""
 
-    def action(stage: Stage) -> None:
+    def action(stage: ScriptAccess) -> None:
         for command in commands:
             stage.acu.answer(command)
 
@@ -159,7 +159,7 @@ def test_a_stop_by_another_hand_in_mid_pass_is_respected_until_a_person_arms() -
 # Shadow
 
 
-def somebody_steers(stage: Stage) -> None:
+def somebody_steers(stage: ScriptAccess) -> None:
     az_deg, el_deg, _ = sky_of(demo_target()).direction(stage.clock.tai_s() + 2.0) or (0.0, 0.0, 0.0)
     for command in (WriteRegisters(az_deg, el_deg), SelectBackup(Backup.REMOTE), SelectMode(AcuMode.AUTOTRACK)):
         stage.acu.answer(command)
@@ -236,7 +236,7 @@ def test_p4_a_silent_host_in_a_loss_is_stopped_by_the_acu_and_a_new_link_goes_on
 
 
 def test_p4_a_watchdog_left_on_by_a_predecessor_hurts_nothing() -> None:
-    def left(stage: Stage) -> None:
+    def left(stage: ScriptAccess) -> None:
         stage.acu.answer(WriteParameter("W", 50))
 
     flight = climb(20.0, demo_target(safety={"register_watchdog_s": 0.0}), script=[(0.0, left)])

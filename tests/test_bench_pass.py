@@ -9,7 +9,7 @@ import pytest
 from late_writes import late_deg
 from script_modules import load
 
-from acu_daemon.report.trace import read_trace
+from acu_daemon.report.pass_trace import read_trace
 from acu_daemon.report.wire import read_writes
 
 bench_pass, pass_rig = load("bench_pass"), load("pass_rig")

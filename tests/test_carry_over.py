@@ -24,7 +24,7 @@ from acu_daemon.assist.estimators.full.carry_over import (
     why_not,
     why_not_resume,
 )
-from acu_daemon.assist.estimators.full.carry_over_test import Denial
+from acu_daemon.assist.estimators.full.carry_over_test import CarryOverTest
 from acu_daemon.assist.estimators.full.estimated_states import BIAS, ORBIT, Prior, make_prior
 from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
 from acu_daemon.assist.estimators.full.normal_points import sights
@@ -327,7 +327,7 @@ def test_a_minute_needs_readings_without_long_gaps(step_s: float, is_denied: boo
     truth, tai_s = manoeuvred(BURN)
     prior = aged_prior(CARRIED, SOURCE, WHERE, SETTINGS, float(tai_s[0]))
     seen = sights(shown(truth, WHERE, np.arange(tai_s[0], tai_s[0] + 120.0, step_s)))
-    assert Denial(SOURCE, WHERE, SETTINGS, prior).sees(seen) == is_denied
+    assert CarryOverTest(SOURCE, WHERE, SETTINGS, prior).sees(seen) == is_denied
 
 
 def test_one_reading_inside_begins_the_minute_again() -> None:
@@ -336,7 +336,7 @@ def test_one_reading_inside_begins_the_minute_again() -> None:
     off, on = (shown(one, WHERE, tai_s[:110]) for one in (truth, TRUTH))
     is_on = np.arange(110) == 55
     mixed = Readings(off.tai_s, np.where(is_on, on.az_deg, off.az_deg), np.where(is_on, on.el_deg, off.el_deg))
-    denial = Denial(SOURCE, WHERE, SETTINGS, prior)
+    denial = CarryOverTest(SOURCE, WHERE, SETTINGS, prior)
     assert (denial.sigmas(sights(mixed)) < 5.0).tolist() == is_on.tolist()
     assert not denial.sees(sights(mixed))
 
@@ -351,7 +351,7 @@ def test_innovations_are_as_large_as_the_prior_says() -> None:
         x = prior.mean[:10] + root @ np.random.default_rng(seed).normal(size=10)
         bias = AngleBias(*(x[6:] / DEG))
         seen = sights(shown(SOURCE.corrected(Correction(*x[:6])), WHERE, tai_s, bias, seed))
-        inside.append((Denial(SOURCE, WHERE, SETTINGS, prior).sigmas(seen) < 1.0).mean())
+        inside.append((CarryOverTest(SOURCE, WHERE, SETTINGS, prior).sigmas(seen) < 1.0).mean())
     assert np.mean(inside) == pytest.approx(0.39, abs=0.08)
 
 

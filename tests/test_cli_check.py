@@ -18,7 +18,7 @@ from test_live_line import SEEN
 from acu_daemon.cli import check, own_daemon
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.control_socket import SOCKET
-from acu_daemon.edge.state import SNAPSHOT, Antenna, antenna_directory
+from acu_daemon.edge.state_directory import SNAPSHOT, StateOwner, antenna_directory
 from acu_daemon.errors import AcuDaemonError
 from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.protocol.messages import (
@@ -359,7 +359,10 @@ def test_the_health_check_looks_only_whether_the_daemon_ticks(tmp_path: Path) ->
 
 
 def test_the_health_check_looks_at_the_antenna_of_its_configuration(tmp_path: Path) -> None:
-    mine, other = Antenna.of("station", "tcp://127.0.0.1:3842", "1"), Antenna.of("Natal", "serial:///dev/ttyS0", "1")
+    mine, other = (
+        StateOwner.of("station", "tcp://127.0.0.1:3842", "1"),
+        StateOwner.of("Natal", "serial:///dev/ttyS0", "1"),
+    )
     state = tmp_path / "state"
     state.mkdir()
     (antenna_directory(state, other) / SNAPSHOT).write_text("{}")
@@ -377,9 +380,9 @@ def test_a_latch_of_another_station_is_none_of_ours_and_ours_by_an_older_name_is
     state.mkdir()
     config = write(tmp_path / "config")
     asked = ("check", "--config", config, "--state", state)
-    (antenna_directory(state, Antenna.of("Natal", "serial:///dev/ttyS0", "1")) / "latch").touch()
+    (antenna_directory(state, StateOwner.of("Natal", "serial:///dev/ttyS0", "1")) / "latch").touch()
     assert "latch" not in lines(acu_daemon(*asked))
-    (antenna_directory(state, Antenna.of("old name", "tcp://127.0.0.1:3842", "1")) / "latch").touch()
+    (antenna_directory(state, StateOwner.of("old name", "tcp://127.0.0.1:3842", "1")) / "latch").touch()
     verdict, text = lines(acu_daemon(*asked))["latch"]
     assert verdict == "NO-GO"
     assert f"`acu-daemon clear --config {config} --state {state}`" in text

@@ -15,7 +15,7 @@ from command_line import acu_daemon
 from config_files import STATION, write
 
 from acu_daemon.edge.control_socket import LONGEST_LINE, MOST_AT_ONCE, SOCKET, ControlSocket, ask
-from acu_daemon.edge.state import Antenna, antenna_directory
+from acu_daemon.edge.state_directory import StateOwner, antenna_directory
 from acu_daemon.errors import AcuDaemonError, UsageError
 
 
@@ -179,7 +179,7 @@ def commands_in(text: str) -> list[list[str]]:
 async def test_of_several_daemons_each_is_listed_with_a_command_that_reaches_it(tmp_path: Path) -> None:
     state, urls = tmp_path / "state", {"one": "tcp://127.0.0.1:3842", "two": "serial:///dev/ttyS0"}
     state.mkdir()
-    folders = {name: antenna_directory(state, Antenna.of(name, url, "1")) for name, url in urls.items()}
+    folders = {name: antenna_directory(state, StateOwner.of(name, url, "1")) for name, url in urls.items()}
     station = f'[station]\nname = "two"\n{STATION.split("[station]")[1]}'.replace(urls["one"], urls["two"])
     config = write(tmp_path / "config", station)
     one = ControlSocket(folders["one"], lambda _: "ok one")

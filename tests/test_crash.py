@@ -24,7 +24,7 @@ from script_modules import load
 
 from acu_daemon.model import sky_angle_deg
 from acu_daemon.orbit.timescales import utc_text
-from acu_daemon.report.trace import read_trace
+from acu_daemon.report.pass_trace import read_trace
 from acu_daemon.report.wire import HALF_SERVO_TICK_S, read_writes, satellite_at
 
 pass_rig, process_load = load("pass_rig"), load("process_load")

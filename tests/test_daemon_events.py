@@ -29,7 +29,7 @@ from flights import (
 )
 
 from acu_daemon.assist.session.refit import RefitReply, RefitRequest, RefitSetup, predict_from
-from acu_daemon.cli.virtual_pass import Flight, Stage
+from acu_daemon.cli.virtual_pass import Flight, ScriptAccess
 from acu_daemon.config.station_tables import LEAST_LOW_WATER_S
 from acu_daemon.daemon.background import RETRY_S, fit_deadline_s
 from acu_daemon.daemon.live import live_text
@@ -65,12 +65,12 @@ FIRST_FIT_S = 1.5  # of autotrack: dwell, and the readings of a first fit
 T = RISING_TAI_S
 
 
-def acu_does(what: Callable[[FakeAcu, float], object]) -> Callable[[Stage], None]:
+def acu_does(what: Callable[[FakeAcu, float], object]) -> Callable[[ScriptAccess], None]:
     return lambda stage: (what(stage.acu, stage.clock.tai_s()), None)[1]
 
 
-def cut(is_cut: bool) -> Callable[[Stage], None]:
-    def action(stage: Stage) -> None:
+def cut(is_cut: bool) -> Callable[[ScriptAccess], None]:
+    def action(stage: ScriptAccess) -> None:
         stage.link.is_cut = is_cut
 
     return action
@@ -299,7 +299,7 @@ def test_a_stow_from_elsewhere_is_respected_through_a_loss_of_the_link() -> None
 
 
 def test_a_stow_by_the_local_panel_is_respected_when_remote_control_comes_back() -> None:
-    def stow_by_hand(stage: Stage) -> None:
+    def stow_by_hand(stage: ScriptAccess) -> None:
         stage.acu.set_local(False, stage.clock.tai_s())
         stage.acu.answer(Stow())
 
@@ -326,7 +326,7 @@ def test_p1_however_the_acu_was_left_nothing_moves_before_its_registers_are_know
 
 
 def test_a_fault_is_read_once_never_reset_and_the_satellite_tracked_after_it() -> None:
-    def mend(stage: Stage) -> None:
+    def mend(stage: ScriptAccess) -> None:
         stage.acu.end_fault("azimuth", 0, stage.clock.tai_s())
         stage.acu.answer(ResetFault())
 
@@ -382,7 +382,7 @@ def test_a_single_refused_write_is_followed_by_a_poll_and_costs_the_beam_nothing
 
 
 def test_the_tilt_register_is_sent_back_unchanged() -> None:
-    def tilt(stage: Stage) -> None:
+    def tilt(stage: ScriptAccess) -> None:
         stage.acu.answer(WriteRegisters(167.0, 20.0, 364))
 
     antenna = AcuChoice(azimuth_deg=168.0, elevation_deg=20.0, has_tilt=True)
@@ -697,7 +697,7 @@ def test_p4_at_9600_baud_a_start_comes_to_its_first_write_of_the_path_in_half_a_
 
 @pytest.mark.parametrize(("baud", "latency_s"), [(9600, 0.013), (9600, 0.002), (19200, 0.010), (0, 0.020)])
 def test_p8_a_start_with_several_exchanges_in_a_tick_makes_the_next_tick_no_later(baud: int, latency_s: float) -> None:
-    def ask(stage: Stage, line: str) -> None:
+    def ask(stage: ScriptAccess, line: str) -> None:
         assert stage.service.answer(line).startswith("ok ")
 
     script = [(3.0 + k * 0.973, partial(ask, line=("disarm", "arm")[k % 2])) for k in range(12)]
@@ -741,7 +741,7 @@ def test_an_antenna_that_autotracks_long_before_the_pass_is_left_to_whoever_uses
     target = demo_target()
     begin = the_pass(target, RISING_TAI_S).rise_tai_s - 600.0
 
-    def use(stage: Stage) -> None:
+    def use(stage: ScriptAccess) -> None:
         stage.acu.answer(SelectMode(AcuMode.AUTOTRACK))
 
     class Other:

@@ -6,7 +6,7 @@ import pytest
 from acu_daemon.assist.session.estimator_comparison import Comparison, compare
 from acu_daemon.assist.session.replay_readings import Replayed
 from acu_daemon.model import Correction, FitResult, Reading
-from acu_daemon.report.comparison import table, what_is_compared
+from acu_daemon.report.comparison_table import table, what_is_compared
 
 FIT = FitResult("one", Correction(), 0.0, 10, 0, 0.0, along_s=-1.25, across_deg=0.01)
 

@@ -19,7 +19,7 @@ from acu_daemon.protocol.messages import (
     ReadFaults,
     ReadParameter,
     ReadRegisters,
-    Registers,
+    RegisterContents,
     ResetFault,
     SelectBackup,
     SelectMode,
@@ -48,9 +48,9 @@ def do(bench: Bench, *commands: Command) -> None:
         assert not isinstance(bench.acu.answer(command), Nak), command
 
 
-def registers(bench: Bench) -> Registers:
+def registers(bench: Bench) -> RegisterContents:
     reply = bench.acu.answer(ReadRegisters())
-    assert isinstance(reply, Registers)
+    assert isinstance(reply, RegisterContents)
     return reply
 
 
@@ -85,7 +85,7 @@ def test_power_up_is_as_section_5_says() -> None:
         False,
         True,
     )
-    assert registers(bench) == Registers(30.0, 40.0, 0, 0)
+    assert registers(bench) == RegisterContents(30.0, 40.0, 0, 0)
     codes = {name: bench.acu.answer(ReadParameter(name)) for name in "ARPMTSW"}
     expected = {"A": 250, "R": 750, "P": 750, "M": 0, "T": 60, "S": 0, "W": 0}
     assert codes == {name: Parameter(name, code) for name, code in expected.items()}

@@ -21,9 +21,9 @@ from acu_daemon.protocol.messages import (
     WriteParameter,
     WriteRegisters,
 )
+from acu_daemon.sim.command_registers import choose_turn, turns_within
 from acu_daemon.sim.pedestal import STEP_S, Axis, Follower
 from acu_daemon.sim.receiver import offset_in_beam
-from acu_daemon.sim.registers import choose_turn, turns_within
 from acu_daemon.sim.scenario import AcuChoice, Encoder, ReceiverChoice, Scenario
 from acu_daemon.sim.sky import Direction
 from acu_daemon.sim.trace import TraceRow

@@ -25,7 +25,7 @@ from late_writes import late_deg
 from script_modules import load
 
 from acu_daemon.model import sky_angle_deg
-from acu_daemon.report.trace import Trace, read_trace
+from acu_daemon.report.pass_trace import Trace, read_trace
 from acu_daemon.report.wire import HALF_SERVO_TICK_S, Writes, read_writes, satellite_at
 from acu_daemon.units import Array
 

@@ -9,11 +9,11 @@ from flights import RISING_TAI_S, climb, demo_target, events_named, register_err
 from test_live_line import SEEN
 
 from acu_daemon.assist.reading_gate import DWELL, SIDE_LOBE, WRONG_TARGET
-from acu_daemon.cli.virtual_pass import Flight, Stage
+from acu_daemon.cli.virtual_pass import Flight, ScriptAccess
 from acu_daemon.daemon.live import live_text
 from acu_daemon.sim.receiver import HALF_POWER_DB, SIDE_LOBE_BEAMS, SIDE_LOBE_DB, pattern_db
 from acu_daemon.sim.scenario import ReceiverChoice
-from acu_daemon.sim.sky import Direction, Sky
+from acu_daemon.sim.sky import Direction, SimulatedSky
 
 DRAWN_S, LOST_S, BACK_S, END_S = 25.0, 45.0, 50.0, 60.0
 DRIFT_DEG_S = 0.2
@@ -24,7 +24,7 @@ T = RISING_TAI_S
 class Drawn:
     """The satellite, but for a while another signal that leaves its path downwards, and then none."""
 
-    def __init__(self, truth: Sky) -> None:
+    def __init__(self, truth: SimulatedSky) -> None:
         self._truth = truth
 
     def direction(self, tai_s: float) -> Direction | None:
@@ -69,10 +69,10 @@ GUST_S, CALM_S, LOBE_END_S = 25.0, 85.0, 95.0  # a gust as the signal comes back
 LOUD = ReceiverChoice(peak_agc_db=26.0)  # its side lobe is 3 dB over the threshold
 
 
-def push(by_deg: float) -> Callable[[Stage], None]:
+def push(by_deg: float) -> Callable[[ScriptAccess], None]:
     """A gust that turns the antenna in an instant."""
 
-    def act(stage: Stage) -> None:
+    def act(stage: ScriptAccess) -> None:
         stage.acu._antenna.el.angle_deg += by_deg
 
     return act

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acu_daemon.errors import UsageError
+from acu_daemon.groundtrack.control_loop import BLOCK_STEPS, fly
 from acu_daemon.groundtrack.environment import STEP_S, even_steps, free_motion
-from acu_daemon.groundtrack.gps import FIX_S, FIXES, NO_STEERING, Receiver, Ripple, TrueOrbit
-from acu_daemon.groundtrack.loop import BLOCK_STEPS, fly
+from acu_daemon.groundtrack.gps import FIX_S, FIXES, NO_STEERING, GpsReceiver, Ripple, TrueOrbit
 from acu_daemon.groundtrack.navigator import Navigator, NavigatorSetup, drift_of
 from acu_daemon.groundtrack.our_controller import DriftFilter, Forecast
 from acu_daemon.groundtrack.paper_controller import PaperController, PaperSettings
@@ -54,7 +54,7 @@ def test_a_straight_drift_is_seen_with_its_slope() -> None:
 
 def test_fixes_have_the_errors_of_the_paper() -> None:
     times_s = even_steps(0.0, FIX_S, 40_000)
-    receiver = Receiver(5.0, np.random.default_rng(2))
+    receiver = GpsReceiver(5.0, np.random.default_rng(2))
     errors = receiver.errors_m(times_s)
     assert np.sqrt(np.mean(np.sum(errors**2, axis=1))) == pytest.approx(RAW_RMS_M, rel=0.05)
     assert np.std(receiver.velocity_errors_m_s(times_s)) == pytest.approx(1.0, rel=0.02)
@@ -65,7 +65,7 @@ def test_fixes_have_the_errors_of_the_paper() -> None:
 def _errors(navigator: Navigator | PaperNavigator, days: float) -> tuple[float, float]:
     """Rms error of D after half a day, m, and the largest."""
     free = free_motion(CRAFT, days, world().flux)
-    orbit, receiver = TrueOrbit(free, NODE_RAD), Receiver(days, np.random.default_rng(5))
+    orbit, receiver = TrueOrbit(free, NODE_RAD), GpsReceiver(days, np.random.default_rng(5))
     times_s = even_steps(FIX_S, FIX_S, int(days * DAY_S / FIX_S))
     r_m, _ = orbit.states(times_s, NO_STEERING)
     fixes_m = r_m + receiver.errors_m(times_s)

@@ -11,9 +11,9 @@ from script_modules import load
 from acu_daemon.edge.tesserals import Forces, integrate, ripple_of
 from acu_daemon.errors import UsageError
 from acu_daemon.groundtrack.atmosphere import Activity, density_table, exospheric_k, semi_annual
-from acu_daemon.groundtrack.elements import MeanElements, mean_of, states_of
 from acu_daemon.groundtrack.environment import EPOCH_TAI_S, even_steps, free_motion
 from acu_daemon.groundtrack.lunisolar import sun
+from acu_daemon.groundtrack.mean_elements import MeanElements, mean_of, states_of
 from acu_daemon.groundtrack.polynomials import constant_runs, fit_polynomials
 from acu_daemon.groundtrack.reference import CBERS_CYCLE, Cycle, micheau_size_m, phased, sun_synchronous
 from acu_daemon.orbit.timescales import gmst_rad

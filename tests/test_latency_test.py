@@ -15,8 +15,8 @@ from real_acu import real_acu
 
 from acu_daemon.cli.latency_test import _link, fits, histogram
 from acu_daemon.config.load import load_station
-from acu_daemon.daemon.lateness import Lateness
-from acu_daemon.daemon.trial import Trial
+from acu_daemon.daemon.latency_trial import Trial
+from acu_daemon.daemon.tick_lateness import Lateness
 from acu_daemon.edge.link import make_link
 from acu_daemon.protocol.messages import Identify, Poll
 

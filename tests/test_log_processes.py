@@ -18,7 +18,7 @@ from test_fault_processes import PATIENCE_S, wait_until
 
 from acu_daemon.edge.control_socket import SOCKET
 from acu_daemon.edge.run_state import RUN_STATE
-from acu_daemon.report.trace import read_trace
+from acu_daemon.report.pass_trace import read_trace
 
 pass_rig = load("pass_rig")
 pytestmark = pytest.mark.realtime

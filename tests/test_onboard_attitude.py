@@ -12,7 +12,7 @@ from acu_daemon.model import EarthOrientation
 from acu_daemon.onboard.aem import matrices, parse_aem
 from acu_daemon.onboard.aem_attitude import AemAttitude, interpolated
 from acu_daemon.onboard.attitude import Agility, AttitudePlan, Hold, plan_attitude
-from acu_daemon.onboard.frames import lvlh_from_inertial
+from acu_daemon.onboard.gimbal_frames import lvlh_from_inertial
 from acu_daemon.orbit.celestial import teme_from_eme2000, teme_from_gcrf, teme_from_tod
 from acu_daemon.orbit.frames import teme_from_itrs
 from acu_daemon.orbit.timescales import tai_from_utc

@@ -8,7 +8,7 @@ from sgp4.api import WGS72, Satrec
 from skyfield.api import EarthSatellite, load, wgs84
 
 from acu_daemon.model import EarthOrientation
-from acu_daemon.onboard.frames import (
+from acu_daemon.onboard.gimbal_frames import (
     Gimbal,
     angles_between_deg,
     beam_direction,

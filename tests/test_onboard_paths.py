@@ -14,8 +14,8 @@ from acu_daemon.model import AxisLimits
 from acu_daemon.onboard.bound import is_feasible, least_rate
 from acu_daemon.onboard.branches import find_branches
 from acu_daemon.onboard.cone import Cone, Tube, azimuth_tube, elevation_interval
-from acu_daemon.onboard.frames import Gimbal, angles_between_deg, beam_direction
 from acu_daemon.onboard.free import free_profile
+from acu_daemon.onboard.gimbal_frames import Gimbal, angles_between_deg, beam_direction
 from acu_daemon.onboard.least_path import Band, least_path
 from acu_daemon.onboard.methods import make_profile
 from acu_daemon.onboard.pointed import fit, samples_for

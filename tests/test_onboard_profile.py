@@ -12,7 +12,7 @@ import pytest
 from made_aems import kvn, quaternions
 from onboard_tasks import made_scenario, made_task
 
-from acu_daemon.edge.onboard import load_pass
+from acu_daemon.edge.onboard_files import load_pass
 from acu_daemon.errors import ProfileError, UsageError
 from acu_daemon.model import AxisLimits, Station
 from acu_daemon.onboard.bound import least_rate
@@ -20,8 +20,8 @@ from acu_daemon.onboard.branches import AZIMUTH_GUARD
 from acu_daemon.onboard.checks import Backlash, check_profile
 from acu_daemon.onboard.cone import Cone, Tube, azimuth_tube, windings
 from acu_daemon.onboard.corrections import after_backlash, aimed, best_turn_deg, with_backlash
-from acu_daemon.onboard.frames import angles_between_deg, beam_direction, lvlh_from_inertial
 from acu_daemon.onboard.free import free_profile
+from acu_daemon.onboard.gimbal_frames import angles_between_deg, beam_direction, lvlh_from_inertial
 from acu_daemon.onboard.ground import footprint_east_north_m, track_east_north_m
 from acu_daemon.onboard.parameter_file import read, write
 from acu_daemon.onboard.pipeline import make
@@ -31,7 +31,7 @@ from acu_daemon.onboard.recheck import check_certificate, check_peaks
 from acu_daemon.onboard.relief import least_interruption, least_margin_deg
 from acu_daemon.onboard.scenarios import DAEJEON
 from acu_daemon.orbit.frames import station_itrs_m, teme_from_itrs
-from acu_daemon.report.onboard import header
+from acu_daemon.report.onboard_text import header
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "config" / "onboard"
 FILE_DEG = 1e-6

@@ -8,7 +8,7 @@ from made_orbits import circular, site, visible
 from real_passes import noisy, sky_angles_deg
 
 from acu_daemon.assist.estimators.estimator import make_estimator
-from acu_daemon.assist.estimators.full.elements_discrepancy import why_far
+from acu_daemon.assist.estimators.full.elements_discrepancy import describe_discrepancy
 from acu_daemon.assist.estimators.full.estimated_states import make_prior
 from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
 from acu_daemon.assist.estimators.full.prior_inflation import WIDTHS
@@ -176,6 +176,6 @@ def test_what_lies_beside_the_track_is_no_matter_of_the_clock() -> None:
 
 
 def test_an_encoder_that_reads_farther_beside_than_expected_is_named() -> None:
-    text = why_far(SOURCE, GIVEN, Correction(), AngleBias(az_deg=0.31), (0.0, 0.0), SOURCE.epoch_tai_s)
+    text = describe_discrepancy(SOURCE, GIVEN, Correction(), AngleBias(az_deg=0.31), (0.0, 0.0), SOURCE.epoch_tai_s)
     assert "the azimuth encoder seems to read +0.31 deg beside (bias_sigma_azimuth_deg = 0.1)" in text
     assert "elevation encoder" not in text

@@ -24,7 +24,7 @@ from real_acu import real_acu
 from script_modules import load
 
 from acu_daemon.protocol.messages import Identify, Poll, ReadRegisters
-from acu_daemon.report.trace import read_trace
+from acu_daemon.report.pass_trace import read_trace
 from acu_daemon.report.wire import read_writes
 
 pass_rig = load("pass_rig")

@@ -32,7 +32,7 @@ from acu_daemon.protocol.messages import (
     Poll,
     ReadParameter,
     ReadRegisters,
-    Registers,
+    RegisterContents,
     Reply,
     Status,
     WriteAndPoll,
@@ -79,7 +79,7 @@ def reply_to(command: Command, written: tuple[float, float]) -> Reply:
         case Identify():
             return Identity("3842", "01")
         case ReadRegisters():
-            return Registers(written[0] % 360.0, written[1], 0, 1)
+            return RegisterContents(written[0] % 360.0, written[1], 0, 1)
         case ReadParameter(name=name):
             return Parameter(name, 0)
     return Ack()

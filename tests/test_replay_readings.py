@@ -14,7 +14,7 @@ from real_passes import noisy, sky_angles_deg
 from acu_daemon.assist.estimators.estimator import ESTIMATORS, EstimatorSettings
 from acu_daemon.assist.session.refit import RefitRequest, RefitSetup, Refitter
 from acu_daemon.assist.session.replay_readings import Replayed, replay
-from acu_daemon.cli.replay import state_of
+from acu_daemon.cli.replay_recording import state_of
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.model import AxisLimits, Correction, Reading, Site, Station
 from acu_daemon.orbit.brouwer import BrouwerElements, BrouwerPropagator

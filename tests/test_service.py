@@ -14,7 +14,7 @@ from script_modules import load
 from supervisor import UNIT, Supervisor, read_unit
 
 from acu_daemon.cli.safe_stop import why_not
-from acu_daemon.report.trace import read_trace
+from acu_daemon.report.pass_trace import read_trace
 
 pass_rig = load("pass_rig")
 realtime = pytest.mark.realtime

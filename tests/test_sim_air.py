@@ -7,7 +7,7 @@ from refraction_figures import integrated_geometric_el_deg
 from acu_daemon.model import Station
 from acu_daemon.pointing.air import Air, refractivity
 from acu_daemon.pointing.refraction import traced
-from acu_daemon.sim.air import simulated_air
+from acu_daemon.sim.shell_air import simulated_air
 
 MARCHED_DEG = 1e-3  # shells against Runge-Kutta; 1e-4 from 1 deg up
 EARTH_M = 6371e3

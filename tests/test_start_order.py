@@ -22,7 +22,7 @@ from acu_daemon.protocol.messages import (
     Parameter,
     ReadParameter,
     ReadRegisters,
-    Registers,
+    RegisterContents,
     Reply,
     Status,
     Stop,
@@ -51,7 +51,7 @@ class SmallAcu:
                 return Identity("3842", "S2")
             case ReadRegisters():
                 az_deg, el_deg = (round(angle / LSB_DEG) * LSB_DEG for angle in self.registers)
-                return Registers(az_deg % 360.0, el_deg, 77, self.count)
+                return RegisterContents(az_deg % 360.0, el_deg, 77, self.count)
             case ReadParameter(name="S"):
                 return Parameter("S", self.sector)
             case WriteParameter(name="S", code=code):

@@ -12,11 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acu_daemon.edge.acu_place import file_name
-from acu_daemon.edge.state import (
+from acu_daemon.edge.state_directory import (
     EVERY_TICKS,
     SNAPSHOT,
-    Antenna,
     SnapshotFile,
+    StateOwner,
     antenna_directory,
     choice_text,
     older_folders,
@@ -92,22 +92,22 @@ def test_a_user_without_a_home_is_told_what_to_do(monkeypatch: pytest.MonkeyPatc
 
 
 URL = "tcp://127.0.0.1:3842"
-CUIABA = Antenna.of("Cuiaba", URL, "1")
+CUIABA = StateOwner.of("Cuiaba", URL, "1")
 
 
 def test_each_antenna_has_a_folder_of_its_own_that_says_whose_it_is(tmp_path: Path) -> None:
     others = [
-        Antenna.of("Alcantara", URL, "1"),
-        Antenna.of("Cuiaba", "tcp://127.0.0.1:3843", "1"),
-        Antenna.of("Cuiaba", URL, "2"),
-        Antenna.of("Cuiaba ", URL, "1"),
-        Antenna.of("cuiaba", URL, "1"),
-        Antenna.of("Cuiab\u00e1", URL, "1"),
-        Antenna.of("../Cuiaba", URL, "1"),
-        Antenna.of("Cuiaba@tcp", URL, "1"),
-        Antenna.of("", URL, "1"),
-        Antenna.of("x" * 300, URL, "1"),
-        Antenna.of("x" * 301, URL, "1"),
+        StateOwner.of("Alcantara", URL, "1"),
+        StateOwner.of("Cuiaba", "tcp://127.0.0.1:3843", "1"),
+        StateOwner.of("Cuiaba", URL, "2"),
+        StateOwner.of("Cuiaba ", URL, "1"),
+        StateOwner.of("cuiaba", URL, "1"),
+        StateOwner.of("Cuiab\u00e1", URL, "1"),
+        StateOwner.of("../Cuiaba", URL, "1"),
+        StateOwner.of("Cuiaba@tcp", URL, "1"),
+        StateOwner.of("", URL, "1"),
+        StateOwner.of("x" * 300, URL, "1"),
+        StateOwner.of("x" * 301, URL, "1"),
     ]
     folders = [antenna_directory(tmp_path, one) for one in (CUIABA, *others)]
     assert len(set(folders)) == len(folders)
@@ -116,7 +116,7 @@ def test_each_antenna_has_a_folder_of_its_own_that_says_whose_it_is(tmp_path: Pa
     assert "@tcp-127.0.0.1-3842-1-" in folders[0].name
     assert all(folder.stat().st_mode & 0o777 == 0o750 and folder.name.count("@") == 1 for folder in folders)
     for same in ("tcp://localhost:3842", f"{URL}?baud=9600"):
-        assert antenna_directory(tmp_path, Antenna.of("Cuiaba", same, "1")) == folders[0]
+        assert antenna_directory(tmp_path, StateOwner.of("Cuiaba", same, "1")) == folders[0]
 
 
 @given(st.text(max_size=80), st.text(max_size=80))
@@ -127,9 +127,9 @@ def test_no_two_names_share_a_file_and_every_one_is_a_plain_word(one: str, other
 
 
 def test_what_an_earlier_version_kept_and_older_names_of_the_antenna_are_found_and_no_others(tmp_path: Path) -> None:
-    renamed = antenna_directory(tmp_path, Antenna.of("Cuiaba old", URL, "1"))
-    moved = antenna_directory(tmp_path, Antenna.of("Cuiaba", "serial:///dev/ttyS0", "1"))
-    antenna_directory(tmp_path, Antenna.of("Natal", "serial:///dev/ttyS1", "1"))
+    renamed = antenna_directory(tmp_path, StateOwner.of("Cuiaba old", URL, "1"))
+    moved = antenna_directory(tmp_path, StateOwner.of("Cuiaba", "serial:///dev/ttyS0", "1"))
+    antenna_directory(tmp_path, StateOwner.of("Natal", "serial:///dev/ttyS1", "1"))
     antenna_directory(tmp_path, CUIABA)
     (tmp_path / "some@file").touch()
     assert older_folders(tmp_path, CUIABA) == (tmp_path, *sorted([renamed, moved]))

@@ -10,7 +10,7 @@ from promise_rig import Rig, demo_scene
 from test_safety import GUARDED, latched, moving
 from test_tick import FITTED, NOW, SKY, saw, status
 
-from acu_daemon.cli.virtual_pass import Stage as Rigged
+from acu_daemon.cli.virtual_pass import ScriptAccess as Rigged
 from acu_daemon.control.safety.command_permit import READS
 from acu_daemon.control.state import ControlState, StartStage, Watchdog
 from acu_daemon.control.tick import tick

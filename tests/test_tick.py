@@ -32,7 +32,7 @@ from acu_daemon.protocol.messages import (
     Poll,
     ReadFaults,
     ReadRegisters,
-    Registers,
+    RegisterContents,
     SelectBackup,
     SelectMode,
     Status,
@@ -511,7 +511,7 @@ def check_allowed(command: Command | None, seen: Status) -> None:
 def test_registers_read_back_wrong_are_written_again_before_any_mode() -> None:
     seen = status(AcuMode.STANDBY)
     state = remembering(ready(TrackState.IDLE, seen), stage=StartStage.PRESENT_WRITTEN, present_deg=(AZ_DEG, EL_DEG))
-    wrong = Exchange(ReadRegisters(), Registers(AZ_DEG + 5.0, EL_DEG, 0, 3))
+    wrong = Exchange(ReadRegisters(), RegisterContents(AZ_DEG + 5.0, EL_DEG, 0, 3))
     state, orders = tick(state, TickInput(saw(seen, extra=wrong), FITTED, NOW), CONFIG)
     assert state.startup.stage is StartStage.SECTOR_FREE
     assert isinstance(orders.first, WriteRegisters)

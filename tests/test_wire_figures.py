@@ -9,7 +9,7 @@ from fake_sky import AZIMUTH, ELEVATION, START_TAI_S, Bench
 
 from acu_daemon.errors import UsageError
 from acu_daemon.protocol.messages import Ack, AcuMode, Nak, SelectMode, WriteAndPoll, WriteRegisters
-from acu_daemon.report.trace import Trace
+from acu_daemon.report.pass_trace import Trace
 from acu_daemon.report.wire import (
     HALF_SERVO_TICK_S,
     Writes,

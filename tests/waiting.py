@@ -16,7 +16,7 @@ import acu_daemon.cli.elements_watch as elements_watch_file
 import acu_daemon.edge.clock as clock_file
 from acu_daemon.cli.elements_watch import ElementsWatch
 from acu_daemon.cli.options import load_target
-from acu_daemon.cli.run import Frame, Prepared, prepare
+from acu_daemon.cli.run import Prepared, RunSetup, prepare
 from acu_daemon.control.state import ControlState
 from acu_daemon.daemon.runs import Runs
 from acu_daemon.daemon.service import Outcome, Service
@@ -117,7 +117,7 @@ class Story:
         parts = AcuParts(*limits, station.receiver.beamwidth_deg, sky, truth.tai_s(), scenario)
         link = MemoryLink(Heard(parts, self.commands), truth)
         files: Any = Now()
-        frame = Frame(self.config, NAME, clock, link, directory, files, inf, is_shadow=False)
+        frame = RunSetup(self.config, NAME, clock, link, directory, files, inf, is_shadow=False)
         self.jobs = [prepare(frame, target)]
         elements = ElementsWatch(self.config, NAME, target, clock)
 

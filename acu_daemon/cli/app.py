@@ -34,15 +34,15 @@ COMMANDS = {  # name: module of acu_daemon.cli, and the function in it
     "fake-acu": ("fake_acu", "command"),
     "fault-proxy": ("fault_proxy", "command"),
     "demo": ("demo", "command"),
-    "passes": ("passes", "command"),
+    "passes": ("coming_passes", "command"),
     "check": ("check", "command"),
     "latency-test": ("latency_test", "command"),
-    "replay": ("replay", "command"),
+    "replay": ("replay_recording", "command"),
     "safe-stop": ("safe_stop", "command"),
-    "arm": ("hands", "arm"),
-    "disarm": ("hands", "disarm"),
-    "clear": ("hands", "clear"),
-    "status": ("hands", "status"),
+    "arm": ("operator_commands", "arm"),
+    "disarm": ("operator_commands", "disarm"),
+    "clear": ("operator_commands", "clear"),
+    "status": ("operator_commands", "status"),
 }
 GROUPS: dict[str, Group] = {
     "groundtrack": Group(
@@ -62,9 +62,9 @@ GROUPS: dict[str, Group] = {
         tracking-parameter file, `check` reads such a file back, `scenarios` compares the methods on made passes.
         """,
         {
-            "profile": ("onboard", "profile"),
-            "check": ("onboard", "check"),
-            "scenarios": ("onboard", "scenarios"),
+            "profile": ("onboard_commands", "profile"),
+            "check": ("onboard_commands", "check"),
+            "scenarios": ("onboard_commands", "scenarios"),
         },
     ),
 }

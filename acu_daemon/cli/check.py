@@ -36,11 +36,11 @@ from acu_daemon.daemon.verdict import Level, alarms, verdict
 from acu_daemon.edge.clock import SystemClock, is_clock_synchronised, system_tai_s
 from acu_daemon.edge.clock_sense import before_elements, before_release
 from acu_daemon.edge.earth_orientation_file import at_date
+from acu_daemon.edge.event_loop import run_loop
 from acu_daemon.edge.latch import ADVICE, DISARMED, LATCH
 from acu_daemon.edge.leap_seconds_file import leap_seconds_told
 from acu_daemon.edge.link import check_rate, make_link
-from acu_daemon.edge.loop import run_loop
-from acu_daemon.edge.state import SNAPSHOT, choice_text, folders_in, older_folders, state_path, with_choice
+from acu_daemon.edge.state_directory import SNAPSHOT, choice_text, folders_in, older_folders, state_path, with_choice
 from acu_daemon.errors import AcuDaemonError, LinkError, OrbitError, UsageError
 from acu_daemon.model import Site
 from acu_daemon.orbit.passes import find_passes

@@ -25,10 +25,10 @@ from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.edge.child_process import start_python
 from acu_daemon.edge.clock import SystemClock
+from acu_daemon.edge.event_loop import run_loop
 from acu_daemon.edge.fit import ProcessFitRunner
 from acu_daemon.edge.link import make_link
 from acu_daemon.edge.logs import configure_logs, tell_signal
-from acu_daemon.edge.loop import run_loop
 from acu_daemon.edge.recording import RecordingWriter
 from acu_daemon.edge.signals import take_signals
 from acu_daemon.errors import AcuDaemonError, UsageError
@@ -36,10 +36,10 @@ from acu_daemon.model import sky_angle_deg
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 from acu_daemon.protocol.messages import AcuMode, Backup, SelectBackup, SelectMode
 from acu_daemon.protocol.sa3842 import DEFAULT_ADDRESS
-from acu_daemon.report.trace import Figures, measure, read_trace
+from acu_daemon.report.pass_trace import Figures, measure, read_trace
 from acu_daemon.sim.build import make_sky
 from acu_daemon.sim.scenario import Loss, Scenario, read_scenario
-from acu_daemon.sim.sky import Sky
+from acu_daemon.sim.sky import SimulatedSky
 
 SATELLITE = "demo-1"
 START_UTC = "2026-08-18T12:44:11Z"  # 62 s before culmination
@@ -108,7 +108,7 @@ async def _demo(config: Path, out: Path) -> Outcome:
             rival.cancel()
 
 
-def _print_plan(target: Target, sky: Sky, losses: tuple[Loss, ...], start_tai_s: float) -> None:
+def _print_plan(target: Target, sky: SimulatedSky, losses: tuple[Loss, ...], start_tai_s: float) -> None:
     """Say beforehand what will be seen."""
     coming = coming_pass(target, start_tai_s)
     station = target.station
@@ -150,7 +150,9 @@ async def _fake_acu(config: Path, at_monotonic_s: float, trace: Path) -> AsyncIt
         await process.wait()
 
 
-async def _assisted(config: Path, url: str, clock: SystemClock, scene: tuple[Scenario, Sky], out: Path) -> Outcome:
+async def _assisted(
+    config: Path, url: str, clock: SystemClock, scene: tuple[Scenario, SimulatedSky], out: Path
+) -> Outcome:
     target = load_target(config, SATELLITE, clock.tai_s())
     station = target.station
     target = replace(target, station=station.model_copy(update={"acu": station.acu.model_copy(update={"url": url})}))
@@ -182,7 +184,7 @@ async def _assisted(config: Path, url: str, clock: SystemClock, scene: tuple[Sce
             clock.close()
 
 
-def _beam_error_deg(seen: Snapshot, scenario: Scenario, sky: Sky) -> float | None:
+def _beam_error_deg(seen: Snapshot, scenario: Scenario, sky: SimulatedSky) -> float | None:
     """Angle between beam and satellite: the demo knows its own pedestal and sky."""
     if seen.az_deg is None or seen.el_deg is None or seen.reading_age_s is None:
         return None

@@ -12,8 +12,8 @@ from acu_daemon.cli.serving import Control, Place, parse_place, serve_until_stop
 from acu_daemon.cli.simulated import station_air
 from acu_daemon.config.load import load_station
 from acu_daemon.edge.clock import SystemClock
+from acu_daemon.edge.event_loop import run_loop
 from acu_daemon.edge.link import BITS_PER_CHARACTER, DEFAULT_BAUD, make_link
-from acu_daemon.edge.loop import run_loop
 from acu_daemon.edge.rehearsal_clock import Meeting, Role
 from acu_daemon.errors import UsageError
 from acu_daemon.protocol.sa3842 import address_byte

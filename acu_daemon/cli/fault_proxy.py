@@ -7,8 +7,8 @@ from typing import Annotated
 import typer
 
 from acu_daemon.cli.serving import Control, Place, parse_place, serve_until_stopped
+from acu_daemon.edge.event_loop import run_loop
 from acu_daemon.edge.link import BITS_PER_CHARACTER, DEFAULT_BAUD, Link, make_link
-from acu_daemon.edge.loop import run_loop
 from acu_daemon.edge.rehearsal_clock import lead
 from acu_daemon.errors import UsageError
 from acu_daemon.sim.fault_board import FaultBoard

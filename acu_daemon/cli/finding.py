@@ -6,7 +6,7 @@ from pathlib import Path
 from acu_daemon.cli.options import antenna_of
 from acu_daemon.config.load import load_station
 from acu_daemon.edge.control_socket import is_answered, no_daemon
-from acu_daemon.edge.state import Antenna, choice_text, folders_in, state_path
+from acu_daemon.edge.state_directory import StateOwner, choice_text, folders_in, state_path
 from acu_daemon.errors import AcuDaemonError
 
 
@@ -34,7 +34,7 @@ def find_daemon(word: str, config: Path | None, state: Path | None, *, is_rehear
     raise AcuDaemonError("\n".join([f"{no_daemon(directory)}; {kind} asked by:", *commands]))
 
 
-def _of_antenna(running: list[Path], antenna: Antenna, directory: Path) -> list[Path]:
+def _of_antenna(running: list[Path], antenna: StateOwner, directory: Path) -> list[Path]:
     own = [path for path in running if path == antenna.folder(directory)]
     return own or [path for path in running if path == directory or antenna.is_kept_in(path)]
 

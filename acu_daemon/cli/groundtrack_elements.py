@@ -71,7 +71,7 @@ def command(
     else:
         _print(sets[-1], history, found)
     if plot is not None:
-        from acu_daemon.report.groundtrack import plot_history
+        from acu_daemon.report.groundtrack_plot import plot_history
 
         plot_history(plot, history, found, sets[-1].label)
 

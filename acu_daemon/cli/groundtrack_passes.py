@@ -83,7 +83,7 @@ def command(
     else:
         _print(satellite, history, sigma_m, found, ahead)
     if plot is not None:
-        from acu_daemon.report.groundtrack import plot_outlook
+        from acu_daemon.report.groundtrack_plot import plot_outlook
 
         plot_outlook(plot, history, sigma_m, found, ahead, satellite)
 

@@ -158,7 +158,7 @@ def _draw(out: Path, labelled: list[tuple[Any, str, Any]], outcomes: list[Any]) 
     from acu_daemon.edge.flux_file import PROFILES, load_flux
     from acu_daemon.groundtrack.environment import STEP_S
     from acu_daemon.groundtrack.smoothing import RECURSION, WINDOW, DriftSmoother
-    from acu_daemon.report.groundtrack import plot_paper_run, plot_profiles, plot_windows
+    from acu_daemon.report.groundtrack_plot import plot_paper_run, plot_profiles, plot_windows
 
     by_run = {(case.profile, case.band_m, how): one for (_, how, case), one in zip(labelled, outcomes, strict=True)}
     tight = by_run["moderate", 100.0, "right"].flown

@@ -90,7 +90,7 @@ def command(
     """
     from acu_daemon.edge.campaign import results_of
     from acu_daemon.edge.flux_file import load_flux
-    from acu_daemon.groundtrack.simulate import Case, Outcome, check_case, make_world
+    from acu_daemon.groundtrack.simulate import Case, CaseOutcome, check_case, make_world
     from acu_daemon.groundtrack.storms import with_storms
 
     refuse_no_picture(plot)
@@ -114,7 +114,7 @@ def command(
     if navigator != "perfect":
         world = with_tesserals(world, is_wanted=tesserals)
     outcomes = _run(world, [replace(case, seed=seed + k) for k in range(runs)], jobs, dask)
-    done = [one for one in outcomes if isinstance(one, Outcome)]
+    done = [one for one in outcomes if isinstance(one, CaseOutcome)]
     if as_json:
         objects = [as_object(outcome) for outcome in done]
         typer.echo(json.dumps(objects if runs > 1 else objects[0] if objects else None, indent=1))
@@ -122,7 +122,7 @@ def command(
         typer.echo("\n".join([HEAD, *(as_row(outcome) for outcome in done)]))
     results_of(outcomes)  # tells the runs that failed; those that did not are written
     if plot is not None:
-        from acu_daemon.report.groundtrack import plot_run
+        from acu_daemon.report.groundtrack_plot import plot_run
 
         plot_run(plot, done[0])
 

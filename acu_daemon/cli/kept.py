@@ -14,7 +14,7 @@ from acu_daemon.assist.estimators.full.carry_over import CarryOver, carry_over_o
 from acu_daemon.cli.options import Target
 from acu_daemon.config.to_settings import estimator_settings
 from acu_daemon.control.state import ControlState, Held, remembered
-from acu_daemon.edge.carry_over import FitKeeper, carry_over_path, read_carry_over
+from acu_daemon.edge.carry_over_file import FitKeeper, carry_over_path, read_carry_over
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.latch import DISARMED, LATCH, LatchKeeper, read_latch
 from acu_daemon.edge.run_state import RUN_STATE, RunState, RunStateKeeper, read_run_state

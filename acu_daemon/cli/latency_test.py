@@ -17,12 +17,12 @@ from acu_daemon.cli.outputs import refuse_no_picture, refuse_unwritable
 from acu_daemon.cli.run import make_job
 from acu_daemon.config.load import load_station
 from acu_daemon.config.station_tables import StationFile
+from acu_daemon.daemon.latency_trial import Trial, try_loop
 from acu_daemon.daemon.port import CYCLE_SHARE, LONGEST_EXTRA, AcuPort
-from acu_daemon.daemon.trial import Trial, try_loop
 from acu_daemon.edge.clock import SystemClock
+from acu_daemon.edge.event_loop import run_loop
 from acu_daemon.edge.fit import ProcessFitRunner
 from acu_daemon.edge.link import Link, make_link
-from acu_daemon.edge.loop import run_loop
 from acu_daemon.edge.scheduling import keep_to_this_thread, may_be_real_time
 from acu_daemon.errors import UsageError
 from acu_daemon.model import Pass, Readings

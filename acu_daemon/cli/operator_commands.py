@@ -10,7 +10,7 @@ from acu_daemon.cli.finding import find_daemon
 from acu_daemon.daemon.overview import status_lines
 from acu_daemon.daemon.snapshot import snapshot_of
 from acu_daemon.edge.control_socket import ask
-from acu_daemon.edge.state import choice_text, with_choice
+from acu_daemon.edge.state_directory import choice_text, with_choice
 from acu_daemon.errors import AcuDaemonError
 
 State = Annotated[

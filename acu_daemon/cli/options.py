@@ -17,7 +17,7 @@ from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.earth_orientation_file import EarthUsed, at_date
 from acu_daemon.edge.elements_file import LoadedElements, load_elements
 from acu_daemon.edge.recording_whose import ElementsUsed, Whose
-from acu_daemon.edge.state import Antenna, refuse_world_writable
+from acu_daemon.edge.state_directory import StateOwner, refuse_world_writable
 from acu_daemon.errors import ElementsError, UsageError
 from acu_daemon.model import EarthOrientation, Pass
 from acu_daemon.orbit.passes import find_passes
@@ -76,9 +76,9 @@ def make_clock(at: str | None, at_monotonic_s: float | None) -> SystemClock:
     return SystemClock(parse_utc("--at", at), PROCESS_START_S if at_monotonic_s is None else at_monotonic_s)
 
 
-def antenna_of(station: StationFile) -> Antenna:
+def antenna_of(station: StationFile) -> StateOwner:
     """The antenna that a station's file is about, by which its state is kept."""
-    return Antenna.of(station.station.name, station.acu.url, station.acu.address)
+    return StateOwner.of(station.station.name, station.acu.url, station.acu.address)
 
 
 def check_duration(duration_s: float | None) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from acu_daemon.daemon.snapshot import Snapshot, snapshot_of
 from acu_daemon.edge.control_socket import SOCKET, ask
-from acu_daemon.edge.state import state_path
+from acu_daemon.edge.state_directory import state_path
 from acu_daemon.errors import AcuDaemonError, UsageError
 
 SERVICES = Path("/var/lib/acu-daemon")  # StateDirectory= of the service

@@ -49,15 +49,15 @@ from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.edge.clock import STEP_S, SystemClock
 from acu_daemon.edge.control_socket import ControlSocket
 from acu_daemon.edge.denied import denied
+from acu_daemon.edge.event_loop import loop_runner
 from acu_daemon.edge.fit import ProcessFitRunner
 from acu_daemon.edge.link import Link, check_rate, make_link
 from acu_daemon.edge.logs import configure_logs, tell_dropped, tell_loop_problem, tell_signal
-from acu_daemon.edge.loop import loop_runner
 from acu_daemon.edge.recording import RecordingWriter
 from acu_daemon.edge.rehearsal_clock import Meeting, Role
 from acu_daemon.edge.scheduling import keep_to_this_thread, scheduling_text
 from acu_daemon.edge.signals import STOPS, take_signals
-from acu_daemon.edge.state import SnapshotFile, antenna_directory, choice_text, older_folders, state_directory
+from acu_daemon.edge.state_directory import SnapshotFile, antenna_directory, choice_text, older_folders, state_directory
 from acu_daemon.edge.systemd import Notifier
 from acu_daemon.edge.writer import QueuedStream, Writer
 from acu_daemon.errors import AcuDaemonError
@@ -156,7 +156,7 @@ def command(
         if record is not None:
             recording = ends.enter_context(RecordingWriter(record, files, clock.tai_s(), whose))
         older = () if clock.is_rehearsal else older_folders(base, antenna)  # nothing is carried between rehearsals
-        frame = Frame(config, satellite, clock, link, directory, files, end_s, shadow, older)
+        frame = RunSetup(config, satellite, clock, link, directory, files, end_s, shadow, older)
         first = prepare(frame, target)
         runner = ends.enter_context(loop_runner())  # where the system denies even that, another start is refused too
         outcome = _watched(runner, _run(frame, first, live, recording))
@@ -182,7 +182,7 @@ def _load(config: Path, name: str, clock: SystemClock) -> Target:
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class RunSetup:
     """What stays the same from one run of this process to the next.
 
     end_s: of --duration, on CLOCK_MONOTONIC.  older: other folders of the same antenna's state.
@@ -208,7 +208,7 @@ class Prepared:
     kept: Kept
 
 
-def prepare(frame: Frame, target: Target, memory: ControlState | None = None) -> Prepared:
+def prepare(frame: RunSetup, target: Target, memory: ControlState | None = None) -> Prepared:
     """Find the pass and what was left for it.  memory: of the run before, where this one begins anew.
 
     Raises: UsageError: no pass is coming, or the elements do not cover it.
@@ -303,7 +303,7 @@ def _announce(target: Target, coming: Pass, clock: SystemClock, *, is_shadow: bo
         log.warning("run.disarmed", reason=reason)
 
 
-async def _run(frame: Frame, first: Prepared, live: LiveLine | None, recording: RecordingWriter | None) -> Outcome:
+async def _run(frame: RunSetup, first: Prepared, live: LiveLine | None, recording: RecordingWriter | None) -> Outcome:
     clock, now = frame.clock, first
     notifier = Notifier()
     health = Health(notifier)

@@ -15,9 +15,9 @@ from acu_daemon.config.station_tables import StationFile
 from acu_daemon.daemon.port import AcuPort
 from acu_daemon.daemon.stopping import DEADLINE_S, stop_antenna
 from acu_daemon.edge.clock import SystemClock
+from acu_daemon.edge.event_loop import run_loop
 from acu_daemon.edge.link import make_link
 from acu_daemon.edge.logs import configure_logs
-from acu_daemon.edge.loop import run_loop
 from acu_daemon.errors import NoAcuError
 from acu_daemon.protocol.sa3842 import address_byte
 

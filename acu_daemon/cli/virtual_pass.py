@@ -28,7 +28,7 @@ from acu_daemon.sim.fault_board import FaultBoard
 from acu_daemon.sim.memory import MemoryLink
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.scenario import Scenario
-from acu_daemon.sim.sky import Sky
+from acu_daemon.sim.sky import SimulatedSky
 from acu_daemon.sim.trace import TraceRow
 from acu_daemon.sim.virtual import run_virtual
 from acu_daemon.sim.wire_log import RegisterWrite
@@ -51,7 +51,7 @@ class Flight:
 
 
 @dataclass(frozen=True, slots=True)
-class Stage:
+class ScriptAccess:
     """What a script can reach."""
 
     acu: FakeAcu
@@ -61,7 +61,7 @@ class Stage:
     board: FaultBoard
 
 
-Action = Callable[[Stage], None]
+Action = Callable[[ScriptAccess], None]
 
 
 class _TappedLink(MemoryLink):
@@ -85,7 +85,7 @@ class _TappedLink(MemoryLink):
 
 def fly(
     target: Target,
-    sky: Sky | Path,
+    sky: SimulatedSky | Path,
     scenario: Scenario,
     *,
     begin_tai_s: float,
@@ -136,7 +136,7 @@ def fly(
         service = Service(job, link, clock, make_runner(job.refit), on_snapshot=flight.snapshots.append)
         loop = asyncio.get_running_loop()
         for tai_s, action in script:
-            loop.call_later(tai_s - begin_tai_s, action, Stage(acu, link, clock, service, board))
+            loop.call_later(tai_s - begin_tai_s, action, ScriptAccess(acu, link, clock, service, board))
         flight.outcome = await service.run()
         acu.advance(clock.tai_s())
 

@@ -23,7 +23,7 @@ from acu_daemon.protocol.messages import (
     Parameter,
     ReadParameter,
     ReadRegisters,
-    Registers,
+    RegisterContents,
     SelectBackup,
     Status,
     Stop,
@@ -127,7 +127,7 @@ def after_reply(
             startup = changed(startup, watchdog=Watchdog.UNKNOWN)  # a backup to select may come from a power cycle
         case (StartStage.NEW, Identify(), Identity() as identity):
             startup = _identified(startup, identity, config, events)
-        case (StartStage.IDENTIFIED, ReadRegisters(), Registers(tilt_code=tilt_code)):
+        case (StartStage.IDENTIFIED, ReadRegisters(), RegisterContents(tilt_code=tilt_code)):
             startup = changed(startup, stage=StartStage.REGISTERS_KNOWN, tilt_code=tilt_code)
         case (StartStage.REGISTERS_KNOWN, ReadParameter("S"), Parameter(code=0)) | (
             StartStage.REGISTERS_KNOWN,
@@ -141,7 +141,7 @@ def after_reply(
             startup = changed(startup, stage=StartStage.SECTOR_FREE)
         case (StartStage.SECTOR_FREE, WriteRegisters() as written, Ack()):
             startup = changed(startup, stage=StartStage.PRESENT_WRITTEN, present_deg=(written.az_deg, written.el_deg))
-        case (StartStage.PRESENT_WRITTEN, ReadRegisters(), Registers() as read):
+        case (StartStage.PRESENT_WRITTEN, ReadRegisters(), RegisterContents() as read):
             startup = changed(startup, stage=StartStage.READY if _matches(startup, read) else StartStage.SECTOR_FREE)
     return state if startup is state.startup else changed(state, startup=startup)
 
@@ -185,7 +185,7 @@ def _after_watchdog(
     return changed(startup, watchdog_from_tai_s=from_tai_s)
 
 
-def _matches(startup: Startup, read: Registers) -> bool:
+def _matches(startup: Startup, read: RegisterContents) -> bool:
     if startup.present_deg is None:
         return False
     az_deg, el_deg = startup.present_deg

@@ -17,11 +17,11 @@ from acu_daemon.control.tick_input import Arrival, Observation, Request, TickInp
 from acu_daemon.control.tracking.causes import LINK_SILENCE_S
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.clock_watch import ClockWatch
-from acu_daemon.daemon.lateness import Lateness
 from acu_daemon.daemon.line_watch import LineWatch
 from acu_daemon.daemon.motion import Motion
 from acu_daemon.daemon.port import AcuPort, Answer
 from acu_daemon.daemon.stopping import DEADLINE_S, stop_antenna
+from acu_daemon.daemon.tick_lateness import Lateness
 from acu_daemon.edge.clock import Clock
 from acu_daemon.model import Reading
 from acu_daemon.protocol.messages import (

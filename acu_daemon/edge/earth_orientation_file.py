@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from acu_daemon.config.station_tables import StationFile, TimeSection
-from acu_daemon.edge.state import refuse_world_writable
+from acu_daemon.edge.state_directory import refuse_world_writable
 from acu_daemon.errors import EarthOrientationError
 from acu_daemon.model import EarthOrientation
 from acu_daemon.orbit.earth_orientation import parse_earth_orientation

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from acu_daemon.config.satellite_tables import BrouwerSection, ElementsFileSection, SatelliteFile
-from acu_daemon.edge.state import refuse_world_writable
+from acu_daemon.edge.state_directory import refuse_world_writable
 from acu_daemon.errors import ElementsError
 from acu_daemon.model import EarthOrientation
 from acu_daemon.orbit.brouwer import BrouwerElements, BrouwerPropagator

@@ -1,7 +1,7 @@
 """What forbids to move, in the state directory: `latch`, of an axis, and `disarmed`, each a file of its own.
 
 Its existence forbids, whatever it holds and whatever the pass: the text, and the UTC since when, each in a line.  One
-that is kept under an older name of the antenna (edge/state.py) stays where it is until a person clears it.
+that is kept under an older name of the antenna (edge/state_directory.py) stays where it is until a person clears it.
 """
 
 import contextlib

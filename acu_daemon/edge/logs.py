@@ -10,7 +10,7 @@ from typing import Any
 import structlog
 
 from acu_daemon.edge.denied import denied
-from acu_daemon.edge.state import with_choice
+from acu_daemon.edge.state_directory import with_choice
 from acu_daemon.edge.writer import Writer, write_text
 from acu_daemon.orbit.timescales import utc_text
 

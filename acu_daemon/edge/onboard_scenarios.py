@@ -28,7 +28,7 @@ class Run:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ScenarioRow:
     """What came out: largest azimuth rates on the polynomials at 20 Hz; nan where there is no path."""
 
     seed: int
@@ -46,7 +46,7 @@ class Row:
     imaging_still: bool | None = None  # both axes, planned imaging first
 
 
-def run_scenario(run: Run) -> Row:
+def run_scenario(run: Run) -> ScenarioRow:
     """Make the scenario and its profiles."""
     kind = KINDS[run.seed % len(KINDS)]
     scenario = make_scenario(kind, np.random.default_rng(run.seed))
@@ -56,7 +56,7 @@ def run_scenario(run: Run) -> Row:
     seconds = time.process_time() - started_s
     single, free = profiles[0], profiles[-1]
     rates = [np.nan if one is None else peak_rate_deg_s(one.azimuth, task.view) for one in profiles]
-    row = Row(
+    row = ScenarioRow(
         seed=run.seed,
         kind=kind,
         culmination_deg=scenario.seen.culmination_el_deg,
@@ -76,7 +76,7 @@ def _violations(task: Task, profile: Profile) -> int:
     return int((off > task.margin_deg).sum())
 
 
-def _with_imaging(row: Row, task: Task, single: Profile) -> Row:
+def _with_imaging(row: ScenarioRow, task: Task, single: Profile) -> ScenarioRow:
     quiet = free_profile(task, "imaging", cap_deg_s=row.single_deg_s)
     if quiet is None:
         return row

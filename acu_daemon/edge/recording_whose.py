@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from acu_daemon import __version__
-from acu_daemon.edge.carry_over import number, reason_of
+from acu_daemon.edge.carry_over_file import number, reason_of
 from acu_daemon.edge.writer import replace_file
 from acu_daemon.model import Station
 

@@ -16,7 +16,7 @@ import structlog
 
 from acu_daemon.assist.estimators.full.carry_over import CarryOver
 from acu_daemon.control.state import ControlState
-from acu_daemon.edge.carry_over import from_json, number, reason_of, to_json
+from acu_daemon.edge.carry_over_file import from_json, number, reason_of, to_json
 from acu_daemon.edge.writer import Latest, Writer, replace_file
 from acu_daemon.errors import OrbitError
 from acu_daemon.model import FitResult, Pass

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from acu_daemon.errors import UsageError
-from acu_daemon.groundtrack.elements import MeanElements, mean_of, states_of
 from acu_daemon.groundtrack.gps import Ripple, axes_of
+from acu_daemon.groundtrack.mean_elements import MeanElements, mean_of, states_of
 from acu_daemon.groundtrack.reference import ReferenceOrbit
 from acu_daemon.orbit.timescales import gmst_rad, utc_days, utc_text
 from acu_daemon.units import Array

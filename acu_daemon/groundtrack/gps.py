@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acu_daemon.groundtrack.elements import MeanElements, states_of
 from acu_daemon.groundtrack.environment import FreeMotion
+from acu_daemon.groundtrack.mean_elements import MeanElements, states_of
 from acu_daemon.orbit.kepler import perifocal_axes
 from acu_daemon.units import Array
 
@@ -107,7 +107,7 @@ def displaced(elements: MeanElements, radial_along_across_m: Array) -> Array:
     return moved
 
 
-class Receiver:
+class GpsReceiver:
     """Draws the errors; the systematic one is a schedule over the whole span, so that fixes may be taken in pieces."""
 
     def __init__(self, days: float, rng: np.random.Generator) -> None:

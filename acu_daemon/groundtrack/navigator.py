@@ -17,10 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acu_daemon.groundtrack.elements import MeanElements, states_of
 from acu_daemon.groundtrack.environment import EPOCH_TAI_S, even_steps
 from acu_daemon.groundtrack.gps import FIX_S, FIXES, NOISE_M, STEP_SIGMA_M, Ripple, axes_of, displaced
 from acu_daemon.groundtrack.lunisolar import plane_rates
+from acu_daemon.groundtrack.mean_elements import MeanElements, states_of
 from acu_daemon.groundtrack.reference import ReferenceOrbit
 from acu_daemon.units import DAY_S, Array
 

@@ -7,9 +7,9 @@ the tesserals, is noise of the acceleration.  The fixes' positions alone are obs
 
 import numpy as np
 
-from acu_daemon.groundtrack.elements import MeanElements, mean_of, states_of
 from acu_daemon.groundtrack.environment import even_steps
 from acu_daemon.groundtrack.gps import FIX_S, FIXES, NOISE_M, STEP_SIGMA_M
+from acu_daemon.groundtrack.mean_elements import MeanElements, mean_of, states_of
 from acu_daemon.groundtrack.navigator import NavigatorSetup
 from acu_daemon.groundtrack.reference import tangential_m_s
 from acu_daemon.units import EARTH_EQUATORIAL_RADIUS_M, J2, MU_M3_S2, Array

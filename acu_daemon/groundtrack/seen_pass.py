@@ -6,8 +6,8 @@ import numpy as np
 
 from acu_daemon.assist.estimators.full.estimated_states import ORBIT, STEPS, correction_of
 from acu_daemon.assist.session.refit import RefitRequest, RefitSetup, Refitter
-from acu_daemon.groundtrack.elements import mean_of
 from acu_daemon.groundtrack.history import Crossing, MeanOrbit, crossing_near
+from acu_daemon.groundtrack.mean_elements import mean_of
 from acu_daemon.model import FitResult, Readings
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import EARTH_EQUATORIAL_RADIUS_M, MU_M3_S2, Array

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from acu_daemon.errors import UsageError
+from acu_daemon.groundtrack.control_loop import Controller, Flown, OrbitNavigator, fly
 from acu_daemon.groundtrack.environment import (
     EPOCH_TAI_S,
     STEP_S,
@@ -18,7 +19,6 @@ from acu_daemon.groundtrack.environment import (
     node_rad,
 )
 from acu_daemon.groundtrack.gps import Ripple, TrueOrbit
-from acu_daemon.groundtrack.loop import Controller, Flown, OrbitNavigator, fly
 from acu_daemon.groundtrack.navigator import Navigator, NavigatorSetup
 from acu_daemon.groundtrack.our_controller import FORECAST_S, NOISE_M, Forecast, OurController, OurSettings
 from acu_daemon.groundtrack.paper_controller import ConstantController, PaperController, PaperSettings
@@ -100,7 +100,7 @@ class World:
         return EPOCH_TAI_S if is_covered else self.flux.start_tai_s
 
 
-class Outcome(NamedTuple):
+class CaseOutcome(NamedTuple):
     """A case and what came of it; `bound_count`: how few manoeuvres the whole band could do with."""
 
     case: Case
@@ -118,7 +118,7 @@ def make_world(
     return World(flux, chosen, polynomials, ripple, known_ripple)
 
 
-def simulate(world: World, case: Case, on_day: Callable[[float], None] | None = None) -> Outcome:
+def simulate(world: World, case: Case, on_day: Callable[[float], None] | None = None) -> CaseOutcome:
     """Run a case; the same seed gives the same outcome, bit for bit.
 
     Raises:  UsageError: a case that cannot be run; the profile ends before the case does.
@@ -143,7 +143,7 @@ def simulate(world: World, case: Case, on_day: Callable[[float], None] | None = 
         execution_sigma=case.execution_sigma,
         on_day=on_day,
     )
-    return Outcome(case, flown, free, bound_count(free, case.band_m))
+    return CaseOutcome(case, flown, free, bound_count(free, case.band_m))
 
 
 def check_case(world: World, case: Case) -> None:

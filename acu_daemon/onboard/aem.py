@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from acu_daemon.onboard.frames import turn
+from acu_daemon.onboard.gimbal_frames import turn
 from acu_daemon.orbit.element_set import Problem, place
 from acu_daemon.orbit.oem import (
     SUPPORTED_FRAMES,

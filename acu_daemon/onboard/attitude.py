@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from acu_daemon.errors import AttitudeError
-from acu_daemon.onboard.frames import body_from_lvlh
+from acu_daemon.onboard.gimbal_frames import body_from_lvlh
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.units import Array
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from acu_daemon.model import AxisLimits
 from acu_daemon.onboard.corrections import after_backlash
-from acu_daemon.onboard.frames import Gimbal
+from acu_daemon.onboard.gimbal_frames import Gimbal
 from acu_daemon.onboard.profile import Profile, Task, off_pointing
 from acu_daemon.onboard.quintic import Path
 from acu_daemon.units import Array

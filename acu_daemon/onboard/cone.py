@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acu_daemon.onboard.frames import boresight_vector
+from acu_daemon.onboard.gimbal_frames import boresight_vector
 from acu_daemon.onboard.quintic import Indices
 from acu_daemon.units import DEG, Array
 

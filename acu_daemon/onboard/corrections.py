@@ -7,7 +7,7 @@ import numpy as np
 
 from acu_daemon.model import AxisLimits
 from acu_daemon.onboard.cone import Cone
-from acu_daemon.onboard.frames import Gimbal, gimbal_angles
+from acu_daemon.onboard.gimbal_frames import Gimbal, gimbal_angles
 from acu_daemon.onboard.quintic import Path
 from acu_daemon.units import DEG, Array
 

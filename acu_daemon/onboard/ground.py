@@ -3,7 +3,7 @@
 import numpy as np
 
 from acu_daemon.model import Station
-from acu_daemon.onboard.frames import Gimbal, beam_direction
+from acu_daemon.onboard.gimbal_frames import Gimbal, beam_direction
 from acu_daemon.onboard.profile import Task
 from acu_daemon.orbit.frames import enu_from_itrs, station_itrs_m
 from acu_daemon.units import DEG, EARTH_EQUATORIAL_RADIUS_M, EARTH_FLATTENING, Array

@@ -6,7 +6,7 @@ import numpy as np
 
 from acu_daemon.model import EarthOrientation
 from acu_daemon.onboard.attitude import Agility, Hold
-from acu_daemon.onboard.frames import lvlh_from_inertial, roll_pitch_to
+from acu_daemon.onboard.gimbal_frames import lvlh_from_inertial, roll_pitch_to
 from acu_daemon.orbit.frames import teme_from_itrs
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import Array

@@ -13,8 +13,8 @@ from acu_daemon.model import AxisLimits, Station
 from acu_daemon.onboard.branches import find_branches, least_bound
 from acu_daemon.onboard.checks import NO_BACKLASH, Backlash, Check, check_profile
 from acu_daemon.onboard.corrections import with_backlash
-from acu_daemon.onboard.frames import Gimbal
 from acu_daemon.onboard.free import free_profile
+from acu_daemon.onboard.gimbal_frames import Gimbal
 from acu_daemon.onboard.methods import make_profile
 from acu_daemon.onboard.pointed import FOLLOWS_DEG, fit
 from acu_daemon.onboard.profile import Method, Objective, Profile, Task

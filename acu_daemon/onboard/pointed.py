@@ -4,7 +4,7 @@ import numpy as np
 
 from acu_daemon.model import AxisLimits
 from acu_daemon.onboard.corrections import aimed, best_turn_deg
-from acu_daemon.onboard.frames import Gimbal
+from acu_daemon.onboard.gimbal_frames import Gimbal
 from acu_daemon.onboard.least_path import nearest_path
 from acu_daemon.onboard.profile import Method, Profile, Task, caps
 from acu_daemon.onboard.quintic import Indices, Knots, Path

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from acu_daemon.model import AxisLimits
 from acu_daemon.onboard.bound import Bound
 from acu_daemon.onboard.cone import Cone
-from acu_daemon.onboard.frames import Gimbal, angles_between_deg, beam_direction, gimbal_angles
+from acu_daemon.onboard.gimbal_frames import Gimbal, angles_between_deg, beam_direction, gimbal_angles
 from acu_daemon.onboard.quintic import Path
 from acu_daemon.onboard.view import PassView
 from acu_daemon.units import Array

@@ -43,7 +43,7 @@ _HEIGHT_KM, _GROUND_SPEED_KM_S = 690.0, 6.85
 
 
 @dataclass(frozen=True, slots=True)
-class Scenario:
+class OnboardScenario:
     """A pass, an orbit and an attitude."""
 
     kind: str
@@ -53,7 +53,7 @@ class Scenario:
     seen: Pass
 
 
-def make_scenario(kind: str, rng: np.random.Generator) -> Scenario:
+def make_scenario(kind: str, rng: np.random.Generator) -> OnboardScenario:
     """Draw a date, a place in the orbit, a pass that culminates high enough, and a mission of that kind."""
     site = Site(DAEJEON)
     for _ in range(_MOST_TRIES):
@@ -67,7 +67,7 @@ def make_scenario(kind: str, rng: np.random.Generator) -> Scenario:
         seen = high[int(rng.integers(len(high)))]
         holds = _MISSIONS[kind](propagator, seen, rng)
         if holds is not None:
-            return Scenario(kind, propagator, plan_attitude(holds, Agility()), site, seen)
+            return OnboardScenario(kind, propagator, plan_attitude(holds, Agility()), site, seen)
     raise ValueError(f"no pass for the kind {kind!r} in {_MOST_TRIES} draws")
 
 
@@ -169,7 +169,7 @@ _MISSIONS: dict[str, Callable[[Sgp4Propagator, Pass, np.random.Generator], _Hold
 }
 
 
-def scenario_task(scenario: Scenario, cone: Cone, azimuth: AxisLimits | None = None) -> Task:
+def scenario_task(scenario: OnboardScenario, cone: Cone, azimuth: AxisLimits | None = None) -> Task:
     """What the scenario's pass asks of an aligned antenna; azimuth's limits default to its range alone."""
     seen, site = scenario.seen, scenario.site
     view = view_pass(

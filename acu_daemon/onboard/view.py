@@ -11,7 +11,7 @@ import numpy as np
 
 from acu_daemon.model import EarthOrientation, Station
 from acu_daemon.onboard.attitude import Attitude
-from acu_daemon.onboard.frames import Gimbal, gimbal_angles, lvlh_from_inertial
+from acu_daemon.onboard.gimbal_frames import Gimbal, gimbal_angles, lvlh_from_inertial
 from acu_daemon.orbit.frames import itrs_from_teme, station_itrs_m, teme_from_itrs
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import DEG, Array

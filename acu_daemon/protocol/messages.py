@@ -183,7 +183,7 @@ class Status:
 
 
 @dataclass(frozen=True, slots=True)
-class Registers:
+class RegisterContents:
     """The command registers; count is the number of accepted writes modulo 256."""
 
     az_deg: float
@@ -280,7 +280,7 @@ class Garbled:
     reason: str
 
 
-Reply = Status | Registers | Identity | Ack | Nak | Faults | Parameter
+Reply = Status | RegisterContents | Identity | Ack | Nak | Faults | Parameter
 
 
 def command_text(command: Command) -> str:

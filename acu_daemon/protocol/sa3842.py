@@ -24,7 +24,7 @@ from acu_daemon.protocol.messages import (
     ReadFaults,
     ReadParameter,
     ReadRegisters,
-    Registers,
+    RegisterContents,
     Reply,
     ResetFault,
     SelectBackup,
@@ -141,7 +141,7 @@ def _reply_data(reply: Reply) -> str:
     match reply:
         case Status():
             return encode_status(reply)
-        case Registers(az_deg, el_deg, tilt_code, count):
+        case RegisterContents(az_deg, el_deg, tilt_code, count):
             return _angles_text(az_deg, el_deg) + hex_text(tilt_code, 4) + hex_text(count, 2)
         case Identity(model, variant):
             return model + variant
@@ -165,7 +165,7 @@ def decode_reply(cmd: int, text: str) -> Reply:
         case 0x31 | 0x41:
             return decode_status(text)
         case 0x33:
-            return Registers(*_angles(text), hex_value(text[8:12]), hex_value(text[12:]))
+            return RegisterContents(*_angles(text), hex_value(text[8:12]), hex_value(text[12:]))
         case 0x3A:
             return Faults(*nibble_values(text))
         case 0x3B:

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
 
-from acu_daemon.report.trace import Trace
+from acu_daemon.report.pass_trace import Trace
 from acu_daemon.units import Array
 
 ASSISTED, MEMORY, SKY = "#0b6e4f", "#c8553d", "#9aa5b1"

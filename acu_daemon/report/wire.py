@@ -11,7 +11,7 @@ from acu_daemon.model import AxisLimits, sky_angle_deg
 from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.pointing.axis import AxisState, step
 from acu_daemon.protocol.angles import LSB_DEG
-from acu_daemon.report.trace import Trace
+from acu_daemon.report.pass_trace import Trace
 from acu_daemon.units import Array, wrap_180
 
 HALF_SERVO_TICK_S = 0.010  # docs/protocol.md, Time tags: a write waits for half a servo tick on average

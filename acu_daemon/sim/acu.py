@@ -20,7 +20,7 @@ from acu_daemon.protocol.messages import (
     ReadFaults,
     ReadParameter,
     ReadRegisters,
-    Registers,
+    RegisterContents,
     Reply,
     ResetFault,
     SelectBackup,
@@ -33,14 +33,14 @@ from acu_daemon.protocol.messages import (
     WriteRegisters,
 )
 from acu_daemon.protocol.sa3842 import CommandEvent, encode_reply
+from acu_daemon.sim.acu_modes import Modes
 from acu_daemon.sim.acu_status import flags_of, status_of
 from acu_daemon.sim.antenna import TILT, Antenna
+from acu_daemon.sim.command_registers import CommandRegisters, turns_within
 from acu_daemon.sim.faults import WATCHDOG_BIT, FaultMemory, FaultNibble
-from acu_daemon.sim.modes import Modes
 from acu_daemon.sim.parameters import Parameters
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.pedestal import STEP_S
-from acu_daemon.sim.registers import CommandRegisters, turns_within
 from acu_daemon.sim.trace import TraceRow
 from acu_daemon.sim.wire_log import RegisterWrite
 
@@ -157,7 +157,7 @@ class FakeAcu:
                 return self._write(az_deg, el_deg, tilt_code if self._has_tilt else None)
             case ReadRegisters():
                 registers = self._registers
-                return Registers(registers.az_deg, registers.el_deg, registers.tilt_code, registers.count)
+                return RegisterContents(registers.az_deg, registers.el_deg, registers.tilt_code, registers.count)
             case SelectMode(mode):
                 return _done(modes.select(mode, self._antenna.receiver.is_acquired, now_s))
             case SelectBackup(backup):

@@ -13,11 +13,11 @@ from random import Random
 from acu_daemon.model import AxisLimits
 from acu_daemon.protocol.angles import elevation_code, elevation_deg
 from acu_daemon.sim.autotrack import Autotrack
+from acu_daemon.sim.command_registers import choose_turn
 from acu_daemon.sim.mount_axes import MountAxes
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.pedestal import STEP_S, Axis, Follower
 from acu_daemon.sim.receiver import Offset, Receiver, ReceiverSettings, offset_in_beam
-from acu_daemon.sim.registers import choose_turn
 from acu_daemon.sim.sky import Direction
 
 TILT = AxisLimits(-15.0, 15.0, 0.5, 0.5)

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from random import Random
 
 from acu_daemon.pointing.air import Air
-from acu_daemon.sim.air import SimulatedAir, simulated_air
 from acu_daemon.sim.scenario import AirChoice
-from acu_daemon.sim.sky import Direction, Sky
+from acu_daemon.sim.shell_air import SimulatedAir, simulated_air
+from acu_daemon.sim.sky import Direction, SimulatedSky
 
 LOWEST_GEOMETRIC_EL_DEG = -1.5  # the densest air lifts what is at -1.2 deg to the horizon
 _LIGHT_M_S = 299792458.0
@@ -20,7 +20,7 @@ class ApparentSky:
     station's aberration are one, but for the turn of the axes meanwhile, 4e-5 deg.
     """
 
-    sky: Sky
+    sky: SimulatedSky
     air: SimulatedAir | None = None
     is_late: bool = False
 

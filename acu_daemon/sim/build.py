@@ -12,7 +12,7 @@ from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.apparent_sky import LOWEST_GEOMETRIC_EL_DEG, ApparentSky, make_air
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.scenario import AirChoice, Scenario, read_scenario
-from acu_daemon.sim.sky import DelayedPropagator, OrbitSky, Sky, read_truth
+from acu_daemon.sim.sky import DelayedPropagator, OrbitSky, SimulatedSky, read_truth
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ def make_sky(
     *,
     station_air: StationAir | None = None,
     seed: int = 0,
-) -> Sky:
+) -> SimulatedSky:
     """The sky as the antenna meets it: from a truth CSV, else from the elements with the scenario's errors.
 
     station_air: None is a vacuum, whatever the scenario says.  UsageError: the CSV is wrong.
@@ -40,7 +40,7 @@ def make_sky(
     if station_air is not None and (station_air.is_there or scenario.air is not None):
         air = make_air(station_air.weather, scenario.air or AirChoice(), site.station.height_m, seed)
     lowest_el_deg = 0.0 if air is None else LOWEST_GEOMETRIC_EL_DEG
-    geometric: Sky
+    geometric: SimulatedSky
     if truth is not None:
         geometric = read_truth(truth, lowest_el_deg)
     else:

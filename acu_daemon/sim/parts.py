@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from acu_daemon.model import AxisLimits
 from acu_daemon.protocol.sa3842 import DEFAULT_ADDRESS
 from acu_daemon.sim.scenario import Scenario
-from acu_daemon.sim.sky import Sky
+from acu_daemon.sim.sky import SimulatedSky
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,7 +15,7 @@ class AcuParts:
     azimuth: AxisLimits
     elevation: AxisLimits
     beamwidth_deg: float
-    sky: Sky
+    sky: SimulatedSky
     start_tai_s: float
     scenario: Scenario = Scenario()
     seed: int = 0

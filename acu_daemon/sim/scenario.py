@@ -20,9 +20,9 @@ from typing import Any, Literal
 
 from acu_daemon.errors import ConfigError
 from acu_daemon.orbit.timescales import unix_from_tai
-from acu_daemon.sim.air import Profile
 from acu_daemon.sim.fault_verbs import Fault, read_fault
 from acu_daemon.sim.mount_axes import MountAxes
+from acu_daemon.sim.shell_air import Profile
 from acu_daemon.sim.toml_table import read_table
 
 Cause = Literal["receiver", "silence-zone", "fade"]

@@ -27,7 +27,7 @@ _BLOCK_S = 60.0
 _BLOCK_STEP_S = 1.0
 
 
-class Sky(Protocol):
+class SimulatedSky(Protocol):
     """Where the satellite is: what an antenna is given is where it appears (apparent_sky.py)."""
 
     def direction(self, tai_s: float) -> Direction | None:

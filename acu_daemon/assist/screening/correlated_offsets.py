@@ -11,7 +11,7 @@ import numpy as np
 
 from acu_daemon.assist.reading_gate import ACCELERATION, OFF_PATH
 from acu_daemon.assist.screening.offsets import Flags, Offsets
-from acu_daemon.assist.screening.orbit_test import Judge
+from acu_daemon.assist.screening.orbit_test import OrbitTest
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import Readings
 
@@ -25,19 +25,19 @@ LONGEST_S = 75.0  # then such readings are better than none
 _NONE = Readings.of([])
 
 
-def wander_deg2(seen: Offsets) -> float:
+def correlated_deg2(seen: Offsets) -> float:
     """The mean product of offsets some readings apart, the largest: 0 for white noise, or up to the mean square."""
     right, up = seen.right_deg, seen.up_deg
     return max(float(right[k:] @ right[:-k] + up[k:] @ up[:-k]) / (right.size - k) for k in LAGS)
 
 
-class Wander:
+class CorrelatedOffsets:
     """Takes readings off the path by little, oldest first.  Mutable; one owner.
 
     reason: of the newest readings, "" while they do not wander.  begin_tai_s: since when the newest ones do.
     """
 
-    def __init__(self, judge: Judge, settings: EstimatorSettings) -> None:
+    def __init__(self, judge: OrbitTest, settings: EstimatorSettings) -> None:
         self._judge, self._settings = judge, settings
         self._recent = _NONE
         self._since_tai_s: float | None = None
@@ -75,7 +75,7 @@ class Wander:
         return self._settings.sigma_azimuth_deg**2 + self._settings.sigma_elevation_deg**2
 
     def _reason(self, kept: Readings, newest: Offsets, offsets_of: Callable[[Readings], Offsets]) -> str:
-        if newest.tai_s.size < WINDOW_COUNT or wander_deg2(newest) <= FACTOR * self._noise_deg2():
+        if newest.tai_s.size < WINDOW_COUNT or correlated_deg2(newest) <= FACTOR * self._noise_deg2():
             return ""
         count = int(np.count_nonzero(self._recent.tai_s >= self.begin_tai_s)) if self.reason else 0
         window = self._recent.part(slice(-max(count, newest.tai_s.size), None))
@@ -86,10 +86,10 @@ class Wander:
         if together is None:
             return ""
         old, new = together.part(slice(None, len(before))), together.part(slice(len(before), None))
-        if wander_deg2(new) <= FACTOR * max(self._noise_deg2(), _noise_seen_deg2(old), wander_deg2(old)):
+        if correlated_deg2(new) <= FACTOR * max(self._noise_deg2(), _noise_seen_deg2(old), correlated_deg2(old)):
             return ""
         whole = offsets_of(window)
-        return ACCELERATION if wander_deg2(_turning(whole)) > TURNING_SHARE * wander_deg2(whole) else OFF_PATH
+        return ACCELERATION if correlated_deg2(_turning(whole)) > TURNING_SHARE * correlated_deg2(whole) else OFF_PATH
 
     def _begin_tai_s(self, seen: Offsets) -> float:
         """Where the readings become more than noise: the most likely instant; where they drift, when that began."""

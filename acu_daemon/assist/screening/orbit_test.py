@@ -39,7 +39,7 @@ def widened(source: Propagator, settings: EstimatorSettings, factor: float) -> E
     return replace(settings, orbit_sigmas=wide, azimuth=None, elevation=None)
 
 
-class Judge:
+class OrbitTest:
     """Fits questioned readings, together with those believed before, to an orbit near the elements."""
 
     def __init__(self, source: Propagator, site: Site, settings: EstimatorSettings) -> None:

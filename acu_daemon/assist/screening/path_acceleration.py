@@ -13,8 +13,10 @@ LIMIT_SHARE = 0.3  # of the drive's acceleration: beyond it autotrack lags
 HALF_STEP_S = 0.25  # of the difference of rates that gives a path's acceleration
 
 
-def is_calm(source: Propagator, site: Site, fit: FitResult | None, tai_s: Array, settings: EstimatorSettings) -> Flags:
-    """Say of each time (N,) whether the path leaves both axes calm; all do where nobody knows the drives.
+def is_low_acceleration(
+    source: Propagator, site: Site, fit: FitResult | None, tai_s: Array, settings: EstimatorSettings
+) -> Flags:
+    """Say of each time (N,) whether both axes accelerate little on the path; all do where the drives are not known.
 
     Raises:  OrbitError: the source has no answer for one of the times.
     """
@@ -23,8 +25,8 @@ def is_calm(source: Propagator, site: Site, fit: FitResult | None, tai_s: Array,
         return np.ones(count, dtype=np.bool_)
     around = np.concatenate((tai_s - HALF_STEP_S, tai_s + HALF_STEP_S))
     path = encoder_look(propagator_of(source, fit), around, site, fit)
-    calm = np.ones(count, dtype=np.bool_)
+    is_low = np.ones(count, dtype=np.bool_)
     for rate_deg_s, axis in ((path.az_rate_deg_s, settings.azimuth), (path.el_rate_deg_s, settings.elevation)):
         acceleration_deg_s2 = (rate_deg_s[count:] - rate_deg_s[:count]) / (2.0 * HALF_STEP_S)
-        calm &= np.abs(acceleration_deg_s2) <= LIMIT_SHARE * axis.max_acceleration_deg_s2
-    return calm
+        is_low &= np.abs(acceleration_deg_s2) <= LIMIT_SHARE * axis.max_acceleration_deg_s2
+    return is_low

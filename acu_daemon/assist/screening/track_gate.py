@@ -16,11 +16,11 @@ import numpy as np
 
 from acu_daemon.assist.reading_gate import ACCELERATION, BELIED, OFF_PATH, WRONG_TARGET, ReadingGate
 from acu_daemon.assist.reading_spans import seconds, span_s, tail_of
-from acu_daemon.assist.screening.correlated_offsets import Wander
+from acu_daemon.assist.screening.correlated_offsets import CorrelatedOffsets
 from acu_daemon.assist.screening.off_path_reason import LOW_DB, is_weak_beside, left_path_tai_s, reason_of, rise_db
 from acu_daemon.assist.screening.offsets import Offsets, offsets
-from acu_daemon.assist.screening.orbit_test import Judge
-from acu_daemon.assist.screening.path_acceleration import is_calm
+from acu_daemon.assist.screening.orbit_test import OrbitTest
+from acu_daemon.assist.screening.path_acceleration import is_low_acceleration
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import FitResult, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
@@ -65,8 +65,8 @@ class TrackGate:
             settings.azimuth,
             settings.elevation,
         )
-        self._judge = Judge(source, site, settings)
-        self._wander = Wander(self._judge, settings)
+        self._judge = OrbitTest(source, site, settings)
+        self._wander = CorrelatedOffsets(self._judge, settings)
         self._kept: list[Readings] = []
         self._waiting = _NONE
         self._waiting_reason = ""
@@ -108,19 +108,19 @@ class TrackGate:
         taken = Taken()
         if len(good):
             seen = self._offsets(good, fit)
-            calm = is_calm(self._source, self._site, fit, good.tai_s, self._settings)
-            reasons[ACCELERATION] = self._leave_out(good.part(~calm), ACCELERATION)
+            is_low = is_low_acceleration(self._source, self._site, fit, good.tai_s, self._settings)
+            reasons[ACCELERATION] = self._leave_out(good.part(~is_low), ACCELERATION)
             if fit is None:
-                taken = self._first(good.part(calm))
+                taken = self._first(good.part(is_low))
             else:
-                is_strong = calm & ~is_weak_beside(seen, good, self.kept, self._settings.beamwidth_deg)
+                is_strong = is_low & ~is_weak_beside(seen, good, self.kept, self._settings.beamwidth_deg)
                 is_asked = is_strong & self._wander.is_within(seen)
                 if self._wanders(good.part(is_asked), fit):
                     reasons[self._wander.reason] += self._leave_out(good.part(is_asked), self._wander.reason)
-                    taken = self._leave_wanderers(good.part(calm & ~is_asked), fit)
+                    taken = self._leave_wanderers(good.part(is_low & ~is_asked), fit)
                 else:
                     is_near = is_strong & seen.is_near
-                    taken = self._follow(good.part(is_near), good.part(calm & ~is_near), fit)
+                    taken = self._follow(good.part(is_near), good.part(is_low & ~is_near), fit)
         reasons[self._waiting_reason] += int(np.count_nonzero(self._waiting.tai_s >= readings.tai_s[0]))
         self.rejecting = max(reasons, key=lambda one: reasons[one]) if 2 * reasons.total() > len(readings) else ""
         return taken

@@ -16,7 +16,7 @@ LEAST_READINGS = 10  # so many of them
 LONGEST_GAP_S = 10.0  # a minute with a longer gap between two readings is no minute of readings
 
 
-class Denial:
+class CarryOverTest:
     """Watches the readings of a pass against its prior.  Mutable; one owner."""
 
     def __init__(self, source: Propagator, site: Site, settings: EstimatorSettings, prior: Prior) -> None:

@@ -16,7 +16,7 @@ BIAS_SIGMAS = 2.0
 ALONG_SHARE = 3.0  # so many times more along the track than beside it is along it
 
 
-def why_far(
+def describe_discrepancy(
     source: Propagator,
     settings: EstimatorSettings,
     correction: Correction,

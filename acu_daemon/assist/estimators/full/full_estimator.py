@@ -6,10 +6,10 @@ import numpy as np
 
 from acu_daemon.assist.estimators.estimator_base import BaseEstimator
 from acu_daemon.assist.estimators.full.carry_over import CarryOver, aged_prior
-from acu_daemon.assist.estimators.full.carry_over_test import DENIED_S, WIDEST_SIGMAS, Denial
-from acu_daemon.assist.estimators.full.elements_discrepancy import why_far
+from acu_daemon.assist.estimators.full.carry_over_test import DENIED_S, WIDEST_SIGMAS, CarryOverTest
+from acu_daemon.assist.estimators.full.elements_discrepancy import describe_discrepancy
 from acu_daemon.assist.estimators.full.estimated_states import Prior, bias_of, correction_of, make_prior, shift_of
-from acu_daemon.assist.estimators.full.least_squares import Problem, Solution, solve
+from acu_daemon.assist.estimators.full.least_squares import Batch, Solution, solve
 from acu_daemon.assist.estimators.full.normal_points import Sights, sights
 from acu_daemon.assist.estimators.full.prior_inflation import WIDTHS, is_strained, most_likely
 from acu_daemon.assist.settings import EstimatorSettings
@@ -43,8 +43,8 @@ class FullEstimator(BaseEstimator):
         """
         super().__init__(propagator, site, settings)
         self._carried = carried
-        self._denial: Denial | None = None
-        self._problem: Problem | None = None
+        self._denial: CarryOverTest | None = None
+        self._problem: Batch | None = None
         self._parts: list[Sights] = []
         self._solution: Solution | None = None
         self._is_new = False
@@ -75,9 +75,9 @@ class FullEstimator(BaseEstimator):
     def _start(self, first_tai_s: float) -> None:
         """Begin with what is known before the first reading, the one at first_tai_s."""
         self._solution = None
-        self._problem = Problem(self._source, self._site, self._settings, self._prior(first_tai_s))
+        self._problem = Batch(self._source, self._site, self._settings, self._prior(first_tai_s))
         if self._carried is not None:
-            self._denial = Denial(self._source, self._site, self._settings, self._problem.prior)
+            self._denial = CarryOverTest(self._source, self._site, self._settings, self._problem.prior)
 
     def _prior(self, at_tai_s: float) -> Prior:
         if self._carried is None:
@@ -101,7 +101,7 @@ class FullEstimator(BaseEstimator):
             self._fit = self._result(self._solution, float(seen.tai_s[-1]))
         return self._fit
 
-    def _solve(self, problem: Problem, seen: Sights) -> Solution:
+    def _solve(self, problem: Batch, seen: Sights) -> Solution:
         given = WIDTHS[self._width].of(problem)
         solution = solve(given, seen, self._solution)
         may_widen = self._may_widen and self._carried is None and seen.tai_s.size >= self._next_try_count
@@ -117,7 +117,7 @@ class FullEstimator(BaseEstimator):
     def _why_far(self, solution: Solution, at_tai_s: float) -> str:
         correction, bias = correction_of(solution.x), bias_of(solution.x)
         shift = shift_for_people(self._source, correction, at_tai_s, self._site)
-        return why_far(self._source, self._settings, correction, bias, shift, at_tai_s)
+        return describe_discrepancy(self._source, self._settings, correction, bias, shift, at_tai_s)
 
     def _result(self, solution: Solution, at_tai_s: float) -> FitResult:
         left_out = int(np.count_nonzero(solution.left.weights == 0.0))

@@ -37,7 +37,7 @@ _DOUBTFUL_SHARE = 0.05  # of the weight lost to outliers: then the readings are 
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class Batch:
     """What is solved for and what is known before the first reading."""
 
     source: Propagator
@@ -46,10 +46,10 @@ class Problem:
     prior: Prior
 
 
-class Partials:
+class OrbitPartials:
     """Partials of the orbit's states, and how far the path has moved on the sky since.  Mutable; one owner."""
 
-    def __init__(self, problem: Problem, x: Array, node_tai_s: Array) -> None:
+    def __init__(self, problem: Batch, x: Array, node_tai_s: Array) -> None:
         _, self.curve = orbit_partials_itrs(problem.source, x, problem.site, node_tai_s)
         self.moved_rad = 0.0
 
@@ -61,10 +61,10 @@ class Solution:
     x: Array
     covariance: Array
     left: Residuals
-    partials: Partials
+    partials: OrbitPartials
 
 
-def solve(problem: Problem, seen: Sights, before: Solution | None) -> Solution:
+def solve(problem: Batch, seen: Sights, before: Solution | None) -> Solution:
     """Find the most likely states.  before: where to start from, such as the solution with fewer readings.
 
     Without it the first minute comes first: at low elevation even elements hundreds of kilometres off are near linear.
@@ -85,10 +85,10 @@ def _first_of(seen: Sights) -> Sights:
     return Sights(*(getattr(seen, item.name)[:end] for item in fields(seen)))
 
 
-def _sweep(problem: Problem, seen: Sights, x: Array, partials: Partials | None) -> Solution:
+def _sweep(problem: Batch, seen: Sights, x: Array, partials: OrbitPartials | None) -> Solution:
     nodes = node_times(float(seen.tai_s[0]), float(seen.tai_s[-1]))
     if partials is None or not np.array_equal(partials.curve.node_tai_s, nodes):
-        partials = Partials(problem, x, nodes)
+        partials = OrbitPartials(problem, x, nodes)
     starts = seconds_of(seen.tai_s)
     has_shift = bool(problem.prior.covariance[STATION, STATION].any())
     for _ in range(_MAX_SWEEPS):
@@ -103,7 +103,7 @@ def _sweep(problem: Problem, seen: Sights, x: Array, partials: Partials | None) 
             break
         partials.moved_rad += step_rad
         if partials.moved_rad > _STALE_RAD:
-            partials = Partials(problem, x, nodes)
+            partials = OrbitPartials(problem, x, nodes)
     return Solution(x, covariance, left, partials)
 
 

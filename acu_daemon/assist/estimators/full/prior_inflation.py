@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from acu_daemon.assist.estimators.full.estimated_states import ORBIT
-from acu_daemon.assist.estimators.full.least_squares import Problem, Solution, solve
+from acu_daemon.assist.estimators.full.least_squares import Batch, Solution, solve
 from acu_daemon.assist.estimators.full.normal_points import Sights
 from acu_daemon.units import DEG, Array
 
@@ -26,7 +26,7 @@ class Width:
     along_deg: float = 0.0
     factor: float = 1.0
 
-    def of(self, problem: Problem) -> Problem:
+    def of(self, problem: Batch) -> Batch:
         """The problem with an orbit that is worth less; itself where it is not, with what it has computed."""
         if self == WIDTHS[0]:
             return problem
@@ -40,7 +40,7 @@ class Width:
 WIDTHS = (Width(), Width(1.0), Width(1.0, 5.0), Width(5.0, 25.0))
 
 
-def most_likely(problem: Problem, least: int, seen: Sights, given: Solution) -> tuple[Solution, int]:
+def most_likely(problem: Batch, least: int, seen: Sights, given: Solution) -> tuple[Solution, int]:
     """The most likely solution among the widths from number `least` of WIDTHS on, whose own is given, and its number.
 
     Raises:  OrbitError: the source has no answer for one of the times, or for the states on the way.
@@ -55,12 +55,12 @@ def most_likely(problem: Problem, least: int, seen: Sights, given: Solution) -> 
     return best[:2]
 
 
-def is_strained(problem: Problem, solution: Solution) -> bool:
+def is_strained(problem: Batch, solution: Solution) -> bool:
     """Whether a solution lies beyond the prior, or far from the readings because of it."""
     return _strain(problem, solution) > STRAIN_LIMIT or float(np.max(solution.left.noise_scale)) > NOISE_LIMIT
 
 
-def evidence(problem: Problem, solution: Solution) -> float:
+def evidence(problem: Batch, solution: Solution) -> float:
     """Logarithm of how likely the readings are under the prior, but for a constant (Laplace's approximation)."""
     (of_prior, _), (of_solution, _) = (_held(problem, one) for one in (problem.prior.covariance, solution.covariance))
     occam = float(np.linalg.slogdet(of_solution)[1] - np.linalg.slogdet(of_prior)[1])
@@ -71,13 +71,13 @@ def evidence(problem: Problem, solution: Solution) -> float:
     return likely
 
 
-def _strain(problem: Problem, solution: Solution) -> float:
+def _strain(problem: Batch, solution: Solution) -> float:
     """How far the states are from the prior's, sigmas squared."""
     correlation, off = _held(problem, problem.prior.covariance, solution.x - problem.prior.mean)
     return float(off @ np.linalg.solve(correlation, off))
 
 
-def _held(problem: Problem, covariance: Array, off: Array | None = None) -> tuple[Array, Array]:
+def _held(problem: Batch, covariance: Array, off: Array | None = None) -> tuple[Array, Array]:
     """The states that the prior leaves open, in its sigmas."""
     sigma = np.sqrt(np.diag(problem.prior.covariance))
     is_open = sigma > 0.0

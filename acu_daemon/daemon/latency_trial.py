@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 from acu_daemon.assist.session.refit import RefitRequest
 from acu_daemon.daemon.background import REFIT_PERIOD_S
-from acu_daemon.daemon.lateness import Lateness
 from acu_daemon.daemon.port import AcuPort
+from acu_daemon.daemon.tick_lateness import Lateness
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.fit import FitFailedError, FitRunner
 from acu_daemon.edge.link import Link

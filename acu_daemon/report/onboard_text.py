@@ -5,8 +5,8 @@ from math import isfinite
 
 import numpy as np
 
-from acu_daemon.edge.onboard import PlannedPass
-from acu_daemon.edge.onboard_scenarios import Row
+from acu_daemon.edge.onboard_files import PlannedPass
+from acu_daemon.edge.onboard_scenarios import ScenarioRow
 from acu_daemon.model import AxisLimits
 from acu_daemon.onboard.pipeline import Made
 from acu_daemon.onboard.profile import Objective, Task, peak_rate_deg_s
@@ -71,7 +71,7 @@ def summary(planned: PlannedPass, task: Task, made: Made, single_deg_s: float) -
     return lines
 
 
-def scenario_table(rows: Sequence[Row], margin_deg: float) -> list[str]:
+def scenario_table(rows: Sequence[ScenarioRow], margin_deg: float) -> list[str]:
     """Lines: the methods' rates by kind and over all, shares, reductions, times."""
     lines = [
         f"{len(rows)} scenarios, margin {margin_deg:g} deg; largest azimuth rates, medians, deg/s",
@@ -102,7 +102,7 @@ def scenario_table(rows: Sequence[Row], margin_deg: float) -> list[str]:
     return lines + _imaging(rows)
 
 
-def _imaging(rows: Sequence[Row]) -> list[str]:
+def _imaging(rows: Sequence[ScenarioRow]) -> list[str]:
     asked = [row for row in rows if row.imaging_free_deg_s is not None]
     if not asked:
         return []
@@ -115,14 +115,14 @@ def _imaging(rows: Sequence[Row]) -> list[str]:
     ]
 
 
-def _line(name: str, rows: Sequence[Row]) -> str:
+def _line(name: str, rows: Sequence[ScenarioRow]) -> str:
     a = _columns(rows)
     medians = "".join(f"{np.nanmedian(a[key]):9.3f}" for key in ("single", "three", "search", "free", "bound"))
     gain = float(np.mean(a["search"] < (1.0 - GAIN) * a["three"]))
     return f"{name:16}{len(rows):6}{medians}{gain:13.0%}{float(np.nanmedian(a['free'] / a['three'])):12.3f}"
 
 
-def _columns(rows: Sequence[Row]) -> Mapping[str, Array]:
+def _columns(rows: Sequence[ScenarioRow]) -> Mapping[str, Array]:
     names = ("single", "three", "search", "free", "bound")
     return {name: np.array([getattr(row, f"{name}_deg_s") for row in rows]) for name in names}
 

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from acu_daemon.groundtrack.environment import even_steps
-from acu_daemon.groundtrack.gps import FIX_S, FIXES, NO_STEERING, Receiver, Steering, TrueOrbit
+from acu_daemon.groundtrack.gps import FIX_S, FIXES, NO_STEERING, GpsReceiver, Steering, TrueOrbit
 from acu_daemon.groundtrack.navigator import STEP_S, drift_of
 from acu_daemon.units import DAY_S, Array
 
@@ -75,7 +75,7 @@ def fly(
     execution_sigma: relative error of a manoeuvre's size, 1 sigma.
     """
     of_fixes, of_manoeuvres = rng.spawn(2)
-    gps = Receiver(days, of_fixes)
+    gps = GpsReceiver(days, of_fixes)
     steps, step = int(days * DAY_S / STEP_S), 0
     steering = NO_STEERING
     seen = np.zeros(steps + 1)
@@ -101,7 +101,7 @@ def fly(
 
 
 def _observed(
-    orbit: TrueOrbit, navigator: OrbitNavigator | None, gps: Receiver, steering: Steering, step: int, count: int
+    orbit: TrueOrbit, navigator: OrbitNavigator | None, gps: GpsReceiver, steering: Steering, step: int, count: int
 ) -> Array:
     """D as seen at the steps after `step`, (count,)."""
     start_s = step * STEP_S

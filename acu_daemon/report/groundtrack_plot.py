@@ -12,7 +12,7 @@ from acu_daemon.groundtrack.environment import EPOCH_TAI_S, STEP_S, Flux, even_s
 from acu_daemon.groundtrack.history import History
 from acu_daemon.groundtrack.kinks import FoundManoeuvre
 from acu_daemon.groundtrack.outlook import Outlook
-from acu_daemon.groundtrack.simulate import Outcome
+from acu_daemon.groundtrack.simulate import CaseOutcome
 from acu_daemon.orbit.timescales import unix_from_tai
 from acu_daemon.units import DAY_S, Array
 
@@ -20,7 +20,7 @@ TRUE, SEEN, LIMIT, SIZE = "#0b6e4f", "#9aa5b1", "#c8553d", "#3d7ea6"
 _SHOWN_STEPS = 20  # one in an hour
 
 
-def plot_run(path: Path, outcome: Outcome) -> None:
+def plot_run(path: Path, outcome: CaseOutcome) -> None:
     """D over the year, and the manoeuvres below; writes a PNG."""
     figure = _figure((10.0, 6.0))
     case = outcome.case
@@ -37,7 +37,7 @@ def plot_run(path: Path, outcome: Outcome) -> None:
     figure.savefig(path)
 
 
-def plot_paper_run(path: Path, runs: dict[str, Outcome], title: str) -> None:
+def plot_paper_run(path: Path, runs: dict[str, CaseOutcome], title: str) -> None:
     """D and sizes of several controllers over the same year, a column each; writes a PNG."""
     figure = _figure((5.2 * max(2, len(runs)), 5.6))
     figure.suptitle(f"SIMULATION, {title}", fontweight="bold")
@@ -52,7 +52,7 @@ def plot_paper_run(path: Path, runs: dict[str, Outcome], title: str) -> None:
     figure.savefig(path)
 
 
-def draw_drift(axes: Axes, outcome: Outcome) -> None:
+def draw_drift(axes: Axes, outcome: CaseOutcome) -> None:
     """True D, D as seen behind it, and the band."""
     flown, thin = outcome.flown, slice(0, None, _SHOWN_STEPS)
     days = flown.times_s[thin] / DAY_S
@@ -63,7 +63,7 @@ def draw_drift(axes: Axes, outcome: Outcome) -> None:
     axes.set_ylabel("D, m (east positive)")
 
 
-def draw_sizes(axes: Axes, outcome: Outcome) -> None:
+def draw_sizes(axes: Axes, outcome: CaseOutcome) -> None:
     """Sizes of the manoeuvres over time."""
     made = outcome.flown.manoeuvres
     axes.vlines([one.time_s / DAY_S for one in made], 0.0, [one.delta_a_m for one in made], color=SIZE, linewidth=1.4)

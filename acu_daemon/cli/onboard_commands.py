@@ -10,7 +10,7 @@ import typer
 
 from acu_daemon.cli.outputs import refuse_no_picture, refuse_unwritable, write_ascii
 from acu_daemon.edge.campaign import progress_bar, results_of, run_campaign
-from acu_daemon.edge.onboard import PlannedPass, load_pass
+from acu_daemon.edge.onboard_files import PlannedPass, load_pass
 from acu_daemon.edge.onboard_scenarios import Run, run_scenario
 from acu_daemon.errors import ProfileError, UsageError
 from acu_daemon.onboard.checks import Check, check_axis, check_profile
@@ -19,7 +19,7 @@ from acu_daemon.onboard.parameter_file import ParameterFile, read, write
 from acu_daemon.onboard.pipeline import Made, make
 from acu_daemon.onboard.profile import METHODS, Profile, Task, peak_rate_deg_s
 from acu_daemon.onboard.recheck import UNLIMITED, check_certificate, check_peaks, grid_s
-from acu_daemon.report.onboard import header, scenario_table, summary
+from acu_daemon.report.onboard_text import header, scenario_table, summary
 
 _WIDEST_MARGIN_DEG = 30.0
 

@@ -58,14 +58,14 @@ def refuse_world_writable(directory: Path) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Antenna:
+class StateOwner:
     """Whose state it is, as names for files.  station: by its name; acu: by its address and its number on the line."""
 
     station: str
     acu: str
 
     @classmethod
-    def of(cls, station: str, acu_url: str, acu_address: str) -> "Antenna":
+    def of(cls, station: str, acu_url: str, acu_address: str) -> "StateOwner":
         return cls(file_name(station), file_name(f"{place_of(acu_url)} {acu_address}"))
 
     def folder(self, directory: Path) -> Path:
@@ -78,7 +78,7 @@ class Antenna:
         return bool(at) and (station == self.station or acu == self.acu)
 
 
-def antenna_directory(directory: Path, antenna: Antenna) -> Path:
+def antenna_directory(directory: Path, antenna: StateOwner) -> Path:
     """Make and return the antenna's folder; on a full disk the directory itself serves.  UsageError: it cannot be."""
     folder = antenna.folder(directory)
     try:
@@ -99,7 +99,7 @@ def folders_in(directory: Path) -> list[Path]:
     return [directory, *found]
 
 
-def older_folders(directory: Path, antenna: Antenna) -> tuple[Path, ...]:
+def older_folders(directory: Path, antenna: StateOwner) -> tuple[Path, ...]:
     """Where else something may be kept of the same antenna."""
     own = antenna.folder(directory)
     try:

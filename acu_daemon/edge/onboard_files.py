@@ -11,7 +11,7 @@ from acu_daemon.model import Pass, Station
 from acu_daemon.onboard.aem import parse_aem
 from acu_daemon.onboard.aem_attitude import AemAttitude
 from acu_daemon.onboard.attitude import Attitude, Hold, plan_attitude
-from acu_daemon.onboard.frames import mount_matrix
+from acu_daemon.onboard.gimbal_frames import mount_matrix
 from acu_daemon.onboard.missions import angles_to, with_nadir
 from acu_daemon.onboard.profile import Task, within
 from acu_daemon.onboard.view import view_pass

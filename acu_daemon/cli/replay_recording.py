@@ -162,7 +162,7 @@ def _replay_to(job: _Job, name: str, out: Path) -> list[Replayed]:
 
 
 def _compare(job: _Job, results: dict[str, list[Replayed]], seconds: dict[str, float], picture: Path) -> None:
-    from acu_daemon.report.comparison import plot, table  # matplotlib is slow to load; one estimator needs none
+    from acu_daemon.report.comparison_table import plot, table  # matplotlib is slow to load; one estimator needs none
 
     seen = compare(job.timed, results, job.target.station.receiver.lock_dwell_s)
     typer.echo("\n".join(table(seen, seconds)))
