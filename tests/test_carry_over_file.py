@@ -14,7 +14,7 @@ import pytest
 from structlog.testing import capture_logs
 
 from acu_daemon.assist.estimators.full.carry_over import CarryOver
-from acu_daemon.edge import carry_over as edge
+from acu_daemon.edge import carry_over_file as edge
 from acu_daemon.edge.carry_over_file import FitKeeper, carry_over_path, read_carry_over, write_carry_over
 from acu_daemon.edge.writer import Writer
 from acu_daemon.model import AngleBias, Correction, FitResult, Station

@@ -14,7 +14,7 @@ from command_line import acu_daemon
 from config_files import BROUWER, replaced, write
 
 from acu_daemon import PROCESS_START_S, __version__
-from acu_daemon.cli import app, passes
+from acu_daemon.cli import app, coming_passes
 from acu_daemon.cli.options import coming_pass, load_target, make_clock, parse_utc
 from acu_daemon.errors import ConfigError, ElementsError, LinkError, NoAcuError, OrbitError, UsageError
 from acu_daemon.orbit.timescales import tai_from_utc
@@ -41,7 +41,7 @@ def test_every_kind_of_failure_has_its_exit_status(
     def fail(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr(passes, "load_station", fail)
+    monkeypatch.setattr(coming_passes, "load_station", fail)
     done = acu_daemon("passes", "--config", write(tmp_path), "--satellite", "scd")
     assert done.code == code
     assert "Traceback" not in done.err
@@ -53,7 +53,7 @@ def test_an_error_of_ours_ends_with_status_4_and_all_we_know(tmp_path: Path, mon
     def fail(*_: object, **__: object) -> None:
         raise KeyError("surprise")
 
-    monkeypatch.setattr(passes, "load_target", fail)
+    monkeypatch.setattr(coming_passes, "load_target", fail)
     done = acu_daemon("passes", "--config", write(tmp_path), "--satellite", "scd")
     assert done.code == app.EXIT_INTERNAL == 4
     assert "KeyError: 'surprise'" in done.err

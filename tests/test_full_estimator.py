@@ -10,7 +10,7 @@ from conftest import needs_data
 from made_orbits import EPOCH_TAI_S, circular, site, visible
 from real_passes import noisy, sky_angles_deg
 
-from acu_daemon.assist import encoder
+from acu_daemon.assist import mount_model
 from acu_daemon.assist.estimators.full.estimated_states import STATE_COUNT, STEPS, correction_of, make_prior, states_of
 from acu_daemon.assist.estimators.full.full_estimator import FullEstimator, shift_for_people
 from acu_daemon.assist.estimators.full.path_partials import (
@@ -354,7 +354,7 @@ def test_a_sigma_from_partials_remembered_of_a_path_nearby_is_that_of_the_path(m
     ]
     fits = [replace(fit, correction=correction) for correction in corrections]
     seen = [sigma_deg(source.corrected(one.correction), tai_s, where, one) for one in fits]
-    monkeypatch.setattr(encoder, "_NEAR_STEPS", 1e-6 * np.array(STEPS))
+    monkeypatch.setattr(mount_model, "_NEAR_STEPS", 1e-6 * np.array(STEPS))
     exact = [sigma_deg(source.corrected(one.correction), tai_s, where, one) for one in fits]
     assert np.allclose(seen, exact, rtol=0.01, atol=0.0)
     assert not np.array_equal(seen, exact)  # the two ways differ
