@@ -8,7 +8,8 @@ from made_orbits import EPOCH_TAI_S, circular, site
 from real_passes import sky_angles_deg
 
 from acu_daemon.assist.session.prediction import predict
-from acu_daemon.model import AxisLimits
+from acu_daemon.control.tracking.track_frame import beside
+from acu_daemon.model import AxisLimits, Correction, sky_angle_deg
 from acu_daemon.orbit.look import look_at
 from acu_daemon.pointing.keyhole import follow_path, longest_window_s
 
@@ -83,3 +84,37 @@ def test_a_buffer_that_starts_inside_the_keyhole_continues_what_the_one_before_p
         late = _predict(propagator, OVERHEAD, later_s, early.az_deg[skip], **more)
         same = early.az_deg.size - skip
         assert np.allclose(late.follow_az_deg[:same], early.follow_az_deg[skip:], atol=0.05)
+
+
+@pytest.mark.parametrize("lead_in_s", [0.0, 25.0])
+@pytest.mark.parametrize("made_after_s", [-5.0, 0.0, 30.0, 45.0, 60.0, 120.0])
+def test_the_turn_asked_for_is_that_of_the_instant_at_which_the_buffer_is_made(lead_in_s, made_after_s):
+    """However long the lead-in and the past of the buffer; before its start, that of the start."""
+    start_tai_s = EPOCH_TAI_S - 45.0
+    for near_az_deg in np.arange(-400.0, 400.0, 17.0).tolist():
+        made_tai_s = start_tai_s + made_after_s
+        buffer = predict(
+            circular(), OVERHEAD, start_tai_s, made_tai_s, "TLE", near_az_deg, horizon_s=90.0, lead_in_s=lead_in_s
+        )
+        at = buffer.at(min(max(made_tai_s, buffer.start_tai_s), buffer.end_tai_s))
+        assert abs(at.az_deg - near_az_deg) <= 180.0 + 1e-6
+
+
+@pytest.mark.parametrize("where", [site(3.0), site(-9.0), site(-4.0, 48.0), site(2.0, -70.0)])
+@pytest.mark.parametrize("i_deg", [28.0, 98.6, 140.0])
+def test_a_satellite_that_is_late_is_where_the_frame_of_the_track_has_it(where, i_deg):
+    """Late on the same orbit, while the Earth has turned on: a mean anomaly that is less by the time it is late."""
+    source = circular(i_deg, e=0.0)
+    tai_s = EPOCH_TAI_S + np.arange(-400.0, 400.0, 50.0)
+    buffer = predict(source, where, EPOCH_TAI_S - 600.0, EPOCH_TAI_S, "TLE", 0.0, horizon_s=1200.0)
+    rate_rad_s = source.mean_elements(np.array([EPOCH_TAI_S, EPOCH_TAI_S + 1.0]))
+    latitude_rad = rate_rad_s.argp_rad + rate_rad_s.mean_anomaly_rad
+    for late_s in (-60.0, -10.0, 10.0, 60.0):
+        behind = Correction(delta_mean_anomaly_rad=-late_s * float(latitude_rad[1] - latitude_rad[0]))
+        seen = look_at(source.corrected(behind), tai_s, where)
+        for k, at in enumerate(tai_s.tolist()):
+            if abs(seen.el_deg[k]) > 89.0:
+                continue
+            point = beside(buffer, at, (late_s, 0.0))
+            apart_deg = sky_angle_deg(point.az_deg, point.el_deg, float(seen.az_deg[k]), float(seen.el_deg[k]))
+            assert apart_deg < 0.001 * abs(late_s)
