@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from math import asin, cos, degrees, radians, sin, sqrt
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -35,9 +35,30 @@ class EarthOrientation:
     polar_y_arcsec: float = 0.0
 
 
+class Antenna(Protocol):
+    """Air and mount, between geometric directions and what the encoders read: pointing.antenna_model.
+
+    Angles in degrees, () or (N,), azimuths continuous; range_m: the satellite's distance.
+    """
+
+    def encoders_deg(
+        self, az_deg: npt.ArrayLike, el_deg: npt.ArrayLike, range_m: npt.ArrayLike
+    ) -> tuple[Array, Array]: ...
+
+    def geometric_deg(
+        self, encoder_az_deg: npt.ArrayLike, encoder_el_deg: npt.ArrayLike, range_m: npt.ArrayLike
+    ) -> tuple[Array, Array]: ...
+
+    def rates_deg_s(
+        self, az_deg: Array, el_deg: Array, range_m: Array, az_rate_deg_s: Array, el_rate_deg_s: Array
+    ) -> tuple[Array, Array]: ...
+
+    def apparent_el_deg(self, el_deg: npt.ArrayLike, range_m: npt.ArrayLike) -> Array: ...
+
+
 @dataclass(frozen=True, slots=True)
 class Site:
-    """A station together with the Earth orientation in force.
+    """A station together with the Earth orientation in force, and its antenna; None: a perfect one in a vacuum.
 
     has_light_time: whether look angles are of where the signal comes from, range / c late (orbit.look).
     """
@@ -45,6 +66,7 @@ class Site:
     station: Station
     orientation: EarthOrientation = EarthOrientation()
     has_light_time: bool = False
+    antenna: Antenna | None = None
 
 
 @dataclass(frozen=True, slots=True)

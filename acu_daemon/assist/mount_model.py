@@ -1,6 +1,8 @@
-"""Directions in the encoder frame as a fit has them: orbit, station's place and angle biases together.  Pure.
+"""Directions in the encoder frame as a fit has them: orbit, station's place, angle biases, air and mount.  Pure.
 
-Commands go through the same encoders as readings, so biases that a fit found belong into the commands.
+Commands go through the same encoders as readings, so biases that a fit found belong into the commands.  Estimators see
+readings without air and mount (`geometric`), and their biases are what is left there; so a predicted direction gets the
+biases first, then the site's antenna.
 """
 
 from collections.abc import Callable
@@ -19,7 +21,7 @@ from acu_daemon.assist.estimators.full.path_partials import (
     site_of,
     sky_partials,
 )
-from acu_daemon.model import AngleBias, Correction, FitResult, Site
+from acu_daemon.model import AngleBias, Antenna, Correction, FitResult, Site
 from acu_daemon.orbit.look import Look, look_at
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import DEG, Array
@@ -36,10 +38,17 @@ def encoder_look(
     propagator: already corrected by the fit.  look: `look_at`, which it is without a fit, or `look_along`.
     Raises:  OrbitError: the propagator has no answer for one of the times.
     """
-    if fit is None:
-        return look(propagator, tai_s, site)
-    seen = look(propagator, tai_s, moved_site(site, fit.station_shift_enu_m))
-    return seen if fit.bias == AngleBias() else _biased(seen, fit.bias)
+    seen = look(propagator, tai_s, site if fit is None else moved_site(site, fit.station_shift_enu_m))
+    if fit is not None and fit.bias != AngleBias():
+        seen = _biased(seen, fit.bias)
+    return seen if site.antenna is None else _on_encoders(seen, site.antenna)
+
+
+def _on_encoders(seen: Look, antenna: Antenna) -> Look:
+    geometric = (seen.az_deg, seen.el_deg, seen.range_m)
+    az_deg, el_deg = antenna.encoders_deg(*geometric)
+    az_rate_deg_s, el_rate_deg_s = antenna.rates_deg_s(*geometric, seen.az_rate_deg_s, seen.el_rate_deg_s)
+    return Look(az_deg % 360.0 % 360.0, el_deg, seen.range_m, az_rate_deg_s, el_rate_deg_s)
 
 
 def _biased(seen: Look, bias: AngleBias) -> Look:

@@ -1,14 +1,19 @@
 """[atmosphere] and [mount] of station.toml: the air that the antenna looks through, and what a survey says of it."""
 
+from functools import lru_cache
+
+import numpy as np
 from pydantic import Field, model_validator
 
 from acu_daemon.config.section import Section
 from acu_daemon.model import Station
 from acu_daemon.pointing.air import Air, refractivity, standard_air
+from acu_daemon.pointing.antenna_model import AntennaModel
 from acu_daemon.pointing.mount import MOST_DEG, TERMS, Mount
 from acu_daemon.pointing.refraction import MOST_N, Refraction, traced
 
 REFRACTION_BY_DEFAULT = False  # of daemon and simulator alike, where [atmosphere] refraction is left out
+SCALE_SIGMA = 0.1  # of the refraction, against the weather told
 MOST_FROM_STANDARD_PRESSURE = 0.15  # weather is within 0.06; more is a pressure reduced to sea level
 
 
@@ -34,6 +39,11 @@ class AtmosphereSection(Section):
     def traced(self, station: Station) -> Refraction | None:
         """The refraction of that air; None: a vacuum."""
         return traced(refractivity(self.air(station)), station) if self.has_refraction else None
+
+    def cot_sigma_deg(self, station: Station) -> float:
+        """What a tenth of the refraction is at 45 deg of elevation, where cot(el) is 1: 1 sigma of a scale."""
+        refraction = self.traced(station)
+        return 0.0 if refraction is None else SCALE_SIGMA * float(refraction.raised_deg(np.array(45.0), np.inf)[0])
 
     def check(self, station: Station) -> None:
         """ValueError: no air of a station is like that."""
@@ -82,3 +92,10 @@ class MountSection(Section):
 
     def mount(self) -> Mount:
         return Mount(**{name: getattr(self, name) for name in TERMS})
+
+
+@lru_cache(maxsize=8)
+def antenna_of(atmosphere: AtmosphereSection, mount: MountSection, station: Station) -> AntennaModel | None:
+    """The antenna's air and mount; None: a perfect mount in a vacuum.  ValueError: no such air."""
+    model = AntennaModel(mount.mount(), atmosphere.traced(station))
+    return None if model == AntennaModel() else model

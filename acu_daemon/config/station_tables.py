@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from acu_daemon.config.antenna_tables import AtmosphereSection, MountSection
+from acu_daemon.config.antenna_tables import AtmosphereSection, MountSection, antenna_of
 from acu_daemon.config.section import Name, Positive, Section
 from acu_daemon.edge.link import make_link
 from acu_daemon.errors import UsageError
@@ -149,10 +149,12 @@ class StationFile(Section):
 
     @model_validator(mode="after")
     def _is_some_air(self) -> "StationFile":
-        self.atmosphere.check(self.site.station)
+        s = self.station
+        self.atmosphere.check(Station(s.name, s.latitude_deg, s.longitude_deg, s.height_m))
         return self
 
     @property
     def site(self) -> Site:
         s = self.station
-        return Site(Station(s.name, s.latitude_deg, s.longitude_deg, s.height_m), self.time.orientation)
+        station = Station(s.name, s.latitude_deg, s.longitude_deg, s.height_m)
+        return Site(station, self.time.orientation, antenna=antenna_of(self.atmosphere, self.mount, station))

@@ -1,5 +1,7 @@
 """From the tables of a station and a satellite to what control and the estimators need.  Pure."""
 
+from math import hypot
+
 from acu_daemon.assist.estimators.estimator import EstimatorSettings
 from acu_daemon.assist.settings import StateSigmas
 from acu_daemon.config.satellite_tables import SatelliteFile, UncertaintySection
@@ -49,7 +51,9 @@ def estimator_settings(station: StationFile, satellite: SatelliteFile) -> Estima
         bias_sigma_azimuth_deg=station.readings.bias_sigma_azimuth_deg,
         bias_sigma_elevation_deg=station.readings.bias_sigma_elevation_deg,
         bias_sigma_azimuth_sec_deg=station.readings.bias_sigma_azimuth_sec_deg,
-        bias_sigma_elevation_cot_deg=station.readings.bias_sigma_elevation_cot_deg,
+        bias_sigma_elevation_cot_deg=hypot(
+            station.readings.bias_sigma_elevation_cot_deg, station.atmosphere.cot_sigma_deg(station.site.station)
+        ),
         orbit_sigmas=_orbit_sigmas(satellite.uncertainty),
         station_sigma_m=station.station.uncertainty_m / 2**0.5,  # of east and of north each
     )

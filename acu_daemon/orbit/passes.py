@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from acu_daemon.model import Pass, Site
 from acu_daemon.orbit.kepler import osculating_from_state
-from acu_daemon.orbit.look import look_at
+from acu_daemon.orbit.look import apparent_at
 from acu_daemon.orbit.propagator import Propagator, spans_tai_s
 from acu_daemon.units import MU_M3_S2, Array
 
@@ -25,6 +25,8 @@ def find_passes(
     propagator: Propagator, site: Site, start_tai_s: float, end_tai_s: float, min_elevation_deg: float
 ) -> list[Pass]:
     """Find every pass that touches the span, in order; rise and set to 1 ms, on the inner side of the crossing.
+
+    Elevations are apparent: those in the air of the site's antenna, if it has any.
 
     A pass in progress at the start (end) has its true rise (set), looked for up to three revolutions outside the
     span.  A satellite that does not rise (set) within those has a pass that begins at the start (ends at the end) of
@@ -58,7 +60,7 @@ def _within(
     """The passes that touch start to end; no time before the first or after the last one is asked for."""
 
     def height(tai_s: Array) -> Array:
-        return look_at(propagator, tai_s, site).el_deg - min_elevation_deg
+        return apparent_at(propagator, tai_s, site).el_deg - min_elevation_deg
 
     revolution_s, step_s = _revolution_and_step_s(propagator, start_tai_s)
     is_up_first, is_up_last = height(np.array([start_tai_s, end_tai_s])) >= 0.0
@@ -129,7 +131,7 @@ def _crossings(
 
 def _pass(propagator: Propagator, site: Site, rise_tai_s: float, set_tai_s: float, inner: Array) -> Pass:
     times = np.concatenate([[rise_tai_s], inner, [set_tai_s]])
-    seen = look_at(propagator, times, site)
+    seen = apparent_at(propagator, times, site)
     top = int(np.argmax(seen.el_deg))
     return Pass(
         rise_tai_s=float(rise_tai_s),

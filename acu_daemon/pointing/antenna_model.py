@@ -57,6 +57,22 @@ class AntennaModel:
             el = self.refraction.geometric_el_deg(el, range_m, self.refraction_scale)
         return az, el
 
+    def apparent_el_deg(self, el_deg: npt.ArrayLike, range_m: npt.ArrayLike = np.inf) -> Array:
+        """Turn a geometric elevation into the one in air."""
+        if self.refraction is None:
+            return np.asarray(el_deg, dtype=np.float64)
+        return self.refraction.apparent_el_deg(el_deg, range_m, self.refraction_scale)
+
+    def rates_deg_s(
+        self, az_deg: Array, el_deg: Array, range_m: Array, az_rate_deg_s: Array, el_rate_deg_s: Array
+    ) -> tuple[Array, Array]:
+        """Turn geometric directions and their rates into the rates of the encoders; the range's is left out."""
+        by = self.with_partials(az_deg, el_deg, range_m)[2].by_direction
+        return (
+            by[..., 0, 0] * az_rate_deg_s + by[..., 0, 1] * el_rate_deg_s,
+            by[..., 1, 0] * az_rate_deg_s + by[..., 1, 1] * el_rate_deg_s,
+        )
+
     def with_partials(
         self, az_deg: npt.ArrayLike, el_deg: npt.ArrayLike, range_m: npt.ArrayLike = np.inf
     ) -> tuple[Array, Array, Partials]:

@@ -1,6 +1,7 @@
 """What all estimators share: the gate, the count of readings, and the figures of a fit.  Pure."""
 
 from abc import ABC, abstractmethod
+from dataclasses import replace
 
 import numpy as np
 
@@ -56,6 +57,7 @@ class BaseEstimator(ABC):
         self.rejected += rejected
         if len(kept) == 0:
             return
+        kept = self._geometric(kept)
         reasons = self._use(kept)
         rows = zip(kept.tai_s.tolist(), kept.az_deg.tolist(), kept.el_deg.tolist(), strict=True)
         used = []
@@ -66,6 +68,15 @@ class BaseEstimator(ABC):
                 self.rejected.append(Rejected(row[0], reason))
         self.used_count += len(used)
         self._newest = (self._newest + used)[-_NEWEST_COUNT:]
+
+    def _geometric(self, readings: Readings) -> Readings:
+        """Readings without air and mount; how far away the satellite is, which matters little, the source says."""
+        antenna = self._site.antenna
+        if antenna is None:
+            return readings
+        range_m = look_at(self._source, readings.tai_s, self._site).range_m
+        az_deg, el_deg = antenna.geometric_deg(readings.az_deg, readings.el_deg, range_m)
+        return replace(readings, az_deg=az_deg % 360.0, el_deg=el_deg)
 
     def fit(self) -> FitResult | None:
         """Give the fit to all readings so far; None while there are too few."""

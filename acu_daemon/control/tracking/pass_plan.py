@@ -4,12 +4,12 @@ from math import isfinite
 
 import numpy as np
 
+from acu_daemon.assist.mount_model import encoder_look
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick_input import PassPlan, Sky
 from acu_daemon.control.tracking.approach import ACQUIRE_LEAD_S
 from acu_daemon.control.tracking.state_table import AUTOTRACKING
 from acu_daemon.model import AxisLimits, Pass, Site
-from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.pointing.reach import OutOfReach, out_of_reach
 from acu_daemon.pointing.wrap import choose_turn, middle_deg
@@ -38,7 +38,7 @@ def plan_pass(
     start_tai_s = min(max(coming.rise_tai_s, now_tai_s), coming.set_tai_s - 1.0)
     step_s = max(STEP_S, (coming.set_tai_s - start_tai_s) / MOST_STEPS)  # one that does not set lasts for days
     tai_s = np.arange(start_tai_s, coming.set_tai_s + step_s, step_s)
-    look = look_at(propagator, tai_s, site)
+    look = encoder_look(propagator, tai_s, site, None)
     az_deg = np.degrees(np.unwrap(np.radians(look.az_deg)))
     turn = choose_turn(az_deg, look.el_deg, azimuth, present_az_deg)
     return PassPlan(
@@ -59,7 +59,7 @@ def beyond_limits(
     """When which axis cannot follow a pass, for an antenna that waits for it in the middle of its range."""
     step_s = max(COARSE_STEP_S, coming.duration_s / MOST_STEPS)
     tai_s = np.arange(coming.rise_tai_s, coming.set_tai_s, step_s)
-    look = look_at(propagator, tai_s, site)
+    look = encoder_look(propagator, tai_s, site, None)
     az_deg = np.degrees(np.unwrap(np.radians(look.az_deg)))
     turn = choose_turn(az_deg, look.el_deg, azimuth, middle_deg(azimuth))
     return out_of_reach(tai_s, az_deg + turn.offset_deg, look.el_deg, azimuth, elevation)
