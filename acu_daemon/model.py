@@ -55,6 +55,11 @@ class Antenna(Protocol):
 
     def apparent_el_deg(self, el_deg: npt.ArrayLike, range_m: npt.ArrayLike) -> Array: ...
 
+    @property
+    def has_air(self) -> bool: ...
+
+    def refraction_shape(self, el_deg: Array, range_m: npt.ArrayLike) -> tuple[Array, Array]: ...
+
 
 @dataclass(frozen=True, slots=True)
 class Site:
@@ -149,7 +154,8 @@ class AngleBias:
     """What the encoders show beyond the geometric angles, degrees; el is the elevation.
 
     Azimuth shows az_deg + az_sec_deg / cos(el) more (the second is the same everywhere across the beam's path, like a
-    collimation error), elevation el_deg + el_cot_deg cot(el) (the second is shaped like refraction).
+    collimation error), elevation el_deg + el_cot_deg cot(el) (the second is shaped like refraction; where the site's
+    antenna has air, like that air's, by its value at 45 deg: what the refraction is off the one told).
     """
 
     az_deg: float = 0.0

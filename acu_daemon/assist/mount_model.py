@@ -13,7 +13,7 @@ import numpy as np
 from acu_daemon.assist.estimators.full.estimated_states import ORBIT, STATE_COUNT, STATION, STEPS, states_of
 from acu_daemon.assist.estimators.full.path_partials import (
     Curve,
-    cot_el,
+    low_shape,
     moved_site,
     node_times,
     orbit_partials_itrs,
@@ -40,7 +40,7 @@ def encoder_look(
     """
     seen = look(propagator, tai_s, site if fit is None else moved_site(site, fit.station_shift_enu_m))
     if fit is not None and fit.bias != AngleBias():
-        seen = _biased(seen, fit.bias)
+        seen = _biased(seen, fit.bias, site)
     return seen if site.antenna is None else _on_encoders(seen, site.antenna)
 
 
@@ -51,16 +51,17 @@ def _on_encoders(seen: Look, antenna: Antenna) -> Look:
     return Look(az_deg % 360.0 % 360.0, el_deg, seen.range_m, az_rate_deg_s, el_rate_deg_s)
 
 
-def _biased(seen: Look, bias: AngleBias) -> Look:
+def _biased(seen: Look, bias: AngleBias, site: Site) -> Look:
     el = np.radians(seen.el_deg)
     sin_el, cos_el = np.sin(el), np.cos(el)
-    cot, sec = cot_el(sin_el, cos_el), sec_el(cos_el)
+    sec = sec_el(cos_el)
+    low, low_slope = low_shape(site, sin_el, cos_el, seen.range_m)
     return Look(
         az_deg=(seen.az_deg + bias.az_deg + bias.az_sec_deg * sec) % 360.0 % 360.0,
-        el_deg=seen.el_deg + bias.el_deg + bias.el_cot_deg * cot,
+        el_deg=seen.el_deg + bias.el_deg + bias.el_cot_deg * low,
         range_m=seen.range_m,
         az_rate_deg_s=seen.az_rate_deg_s + bias.az_sec_deg * DEG * sec * sec * sin_el * seen.el_rate_deg_s,
-        el_rate_deg_s=seen.el_rate_deg_s * (1.0 - bias.el_cot_deg * DEG * (1.0 + cot * cot)),
+        el_rate_deg_s=seen.el_rate_deg_s * (1.0 + bias.el_cot_deg * low_slope),
     )
 
 

@@ -2,13 +2,12 @@
 
 from functools import lru_cache
 
-import numpy as np
 from pydantic import Field, model_validator
 
 from acu_daemon.config.section import Section
 from acu_daemon.model import Station
 from acu_daemon.pointing.air import Air, refractivity, standard_air
-from acu_daemon.pointing.antenna_model import AntennaModel
+from acu_daemon.pointing.antenna_model import AntennaModel, refraction_at_45_deg
 from acu_daemon.pointing.mount import MOST_DEG, TERMS, Mount
 from acu_daemon.pointing.refraction import MOST_N, Refraction, traced
 
@@ -43,7 +42,7 @@ class AtmosphereSection(Section):
     def cot_sigma_deg(self, station: Station) -> float:
         """What a tenth of the refraction is at 45 deg of elevation, where cot(el) is 1: 1 sigma of a scale."""
         refraction = self.traced(station)
-        return 0.0 if refraction is None else SCALE_SIGMA * float(refraction.raised_deg(np.array(45.0), np.inf)[0])
+        return 0.0 if refraction is None else SCALE_SIGMA * refraction_at_45_deg(refraction)
 
     def check(self, station: Station) -> None:
         """ValueError: no air of a station is like that."""

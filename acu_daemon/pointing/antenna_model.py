@@ -5,6 +5,7 @@ reading with an orbit, or commands a direction, goes through here once.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +28,12 @@ class Partials:
 
 
 STATES = (*TERMS, "refraction_scale")
+
+
+@lru_cache(maxsize=8)
+def refraction_at_45_deg(refraction: Refraction) -> float:
+    """Refraction of a source at infinity at 45 deg of elevation, where cot(el) is 1."""
+    return float(refraction.raised_deg(np.array(45.0), np.inf)[0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +69,23 @@ class AntennaModel:
         if self.refraction is None:
             return np.asarray(el_deg, dtype=np.float64)
         return self.refraction.apparent_el_deg(el_deg, range_m, self.refraction_scale)
+
+    @property
+    def has_air(self) -> bool:
+        """Whether there is refraction."""
+        return self.refraction is not None
+
+    def refraction_shape(self, el_deg: Array, range_m: npt.ArrayLike = np.inf) -> tuple[Array, Array]:
+        """Give the refraction at geometric elevations, its value at 45 deg being 1, and its derivative, 1 / deg.
+
+        What a scale of the refraction moves.  ValueError: there is none.
+        """
+        if self.refraction is None:
+            raise ValueError("no air, no refraction")
+        at_45_deg = refraction_at_45_deg(self.refraction)
+        raised_deg, _ = self.refraction.raised_deg(el_deg, range_m)
+        raised_deg, slope = self.refraction.raised_deg(el_deg + raised_deg, range_m)
+        return raised_deg / at_45_deg, slope / at_45_deg
 
     def rates_deg_s(
         self, az_deg: Array, el_deg: Array, range_m: Array, az_rate_deg_s: Array, el_rate_deg_s: Array

@@ -20,6 +20,7 @@ from acu_daemon.units import DAY_S, DEG, Array
 ORBIT_COUNT = 6
 STATE_COUNT = 13
 ORBIT, BIAS, STATION = slice(0, 6), slice(6, 10), slice(10, 13)
+EL_COT = 9
 STEPS = (1e-5, 1e-5, 1e-10, 1e-5, 1e-5, 1e-5)  # for differences: some 70 m each; 60 m after a day for the mean motion
 
 _UP_SHARE = 0.1  # coordinates are rounded in latitude and longitude; heights are known much better

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from acu_daemon.assist.estimators.full.estimated_states import BIAS
-from acu_daemon.assist.estimators.full.path_partials import Curve, cot_el, enu_m
+from acu_daemon.assist.estimators.full.estimated_states import BIAS, EL_COT
+from acu_daemon.assist.estimators.full.path_partials import Curve, cot_el, enu_m, low_shape
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import Readings, Site
 from acu_daemon.units import DEG, Array
@@ -55,13 +55,15 @@ class Residuals:
 def residuals(path: Curve, here: Site, x: Array, settings: EstimatorSettings, seen: Sights) -> Residuals:
     """Compare readings with a path, the site and the biases of the states x."""
     enu = enu_m(path.at(seen.tai_s), here)
-    east, north, up = enu / np.sqrt((enu * enu).sum(axis=0))
+    range_m = np.sqrt((enu * enu).sum(axis=0))
+    east, north, up = enu / range_m
     cos_el = np.sqrt(east * east + north * north)
     cot = cot_el(up, cos_el)
+    low, _ = low_shape(here, up, cos_el, range_m) if x[EL_COT] else (cot, cot)
     az, az_sec, el, el_cot = x[BIAS]
     off, sigma = np.empty((2, 2, seen.tai_s.size))
     off[0] = seen.sin_az * north - seen.cos_az * east - az * cos_el - az_sec
-    off[1] = seen.sin_el * (seen.sin_az * east + seen.cos_az * north) - seen.cos_el * up - el - el_cot * cot
+    off[1] = seen.sin_el * (seen.sin_az * east + seen.cos_az * north) - seen.cos_el * up - el - el_cot * low
     sigma[0] = settings.sigma_azimuth_deg * DEG
     sigma[1] = (settings.sigma_elevation_deg + settings.sigma_elevation_cot_deg * cot) * DEG
     sigmas_off = off / sigma

@@ -134,10 +134,18 @@ def sky_partials(r_itrs_m: Array, orbit_itrs: Array, site: Site, has_shift: bool
     out[6, 0] = cos_el
     out[7, 0] = 1.0
     out[8, 1] = 1.0
-    out[9, 1] = cot_el(sin_el, cos_el)
+    out[9, 1] = low_shape(site, sin_el, cos_el, range_m)[0]
     if has_shift:
         out[10:] = turned(station_partials_enu(r_itrs_m, site))
     return out
+
+
+def low_shape(site: Site, sin_el: Array, cos_el: Array, range_m: Array) -> tuple[Array, Array]:
+    """What a unit of the bias el_cot moves in elevation, and its derivative by that, 1 / deg: AngleBias."""
+    if site.antenna is not None and site.antenna.has_air:
+        return site.antenna.refraction_shape(np.arctan2(sin_el, cos_el) / DEG, range_m)
+    cot = cot_el(sin_el, cos_el)
+    return cot, -DEG * (1.0 + cot * cot)
 
 
 def cot_el(sin_el: Array, cos_el: Array) -> Array:
