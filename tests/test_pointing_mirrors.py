@@ -140,12 +140,13 @@ def test_an_azimuth_on_its_way_is_judged_alike_to_both_sides(start_deg, moves):
     for rate_deg_s, goal_deg in moves:
         for _ in range(12):
             tai_s, az_deg = tai_s + 1.3, min(max(az_deg + 1.3 * rate_deg_s, -269.2), 269.4)
-            watch, is_standing = watch_goal(watch, tai_s, az_deg, goal_deg, limits)
+            watch, is_standing = watch_goal(watch, tai_s, az_deg, goal_deg, limits, scale=1.0)
             mirrored_goal_deg = None if goal_deg is None else -goal_deg
-            other, of_mirror = watch_goal(other, tai_s, -az_deg, mirrored_goal_deg, limits)
+            other, of_mirror = watch_goal(other, tai_s, -az_deg, mirrored_goal_deg, limits, scale=1.0)
             assert (is_standing, watch.problem == "") == (of_mirror, other.problem == "")
             assert (watch.way_deg, watch.begun_tai_s) == pytest.approx((other.way_deg, other.begun_tai_s))
-            assert (watch.nearest_deg, watch.nearer_tai_s) == pytest.approx((other.nearest_deg, other.nearer_tai_s))
+            assert (watch.side, watch.mark_tai_s) == (-other.side, other.mark_tai_s)
+            assert watch.mark_deg == pytest.approx(-other.mark_deg)
             if goal_deg is not None:
                 pulls = is_pulled_round(az_deg, rate_deg_s, goal_deg, limits)
                 assert is_pulled_round(-az_deg, -rate_deg_s, -goal_deg, limits) == pulls
@@ -157,7 +158,7 @@ def test_an_azimuth_that_stands_is_told_on_both_sides_of_its_goal() -> None:
         watch = TurnWatch()
         standing = []
         for k in range(200):
-            watch, is_standing = watch_goal(watch, 8.4e8 + 0.1 * k, 0.0, goal_deg, limits)
+            watch, is_standing = watch_goal(watch, 8.4e8 + 0.1 * k, 0.0, goal_deg, limits, scale=1.0)
             standing.append(is_standing)
         assert standing[-1]
         assert not standing[40]
