@@ -596,7 +596,38 @@ def test_when_the_elements_steer_again_state_snapshot_and_live_line_say_so() -> 
         assert (seen.model == "new fit") == is_fitted
         assert seen.state.endswith("FITTED") <= is_fitted
         assert ("no fit in force" in live_text(seen)) == (not is_fitted)
+        assert (seen.fit_age_s is not None) == is_fitted
     assert worst_error_deg(flight, T + 20.0, T + 30.0) < HOLD_DEG  # on what autotrack showed of the path
+
+
+class Leisurely(InlineFitRunner):
+    """Answers after most of a second, and notes when it was asked and had answered, TAI."""
+
+    ANSWER_S = 0.75
+
+    def __init__(self, setup: RefitSetup) -> None:
+        super().__init__(setup, self.ANSWER_S)
+        self.asked_tai_s: list[float] = []
+
+    async def refit(self, request: RefitRequest) -> RefitReply:
+        self.asked_tai_s.append(request.now_tai_s)
+        return await super().refit(request)
+
+
+@pytest.mark.parametrize("lost_s", [14.0, 14.2, 14.4, 14.6, 14.8])
+def test_a_loss_is_answered_by_a_fresh_buffer_at_once_or_as_soon_as_the_fit_in_hand_is_done(lost_s: float) -> None:
+    made: list[Leisurely] = []
+
+    def make(setup: RefitSetup) -> Leisurely:
+        made.append(Leisurely(setup))
+        return made[-1]
+
+    flight = climb(18.0, losses=[(lost_s, 18.0)], make_runner=make)
+    held_tai_s = T + lost_s + seconds_to_state(flight, "HOLD/FITTED", T + lost_s)
+    (runner,) = made
+    in_hand_until_tai_s = max(at for at in runner.asked_tai_s if at < held_tai_s - TICK_S / 2) + Leisurely.ANSWER_S
+    next_tai_s = min(at for at in runner.asked_tai_s if at >= held_tai_s - TICK_S / 2)
+    assert next_tai_s <= max(held_tai_s, in_hand_until_tai_s) + TICK_S / 2
 
 
 class Hanging(InlineFitRunner):

@@ -8,8 +8,10 @@ from made_orbits import EPOCH_TAI_S, circular, site
 from real_passes import sky_angles_deg
 
 from acu_daemon.assist.session.prediction import predict
+from acu_daemon.assist.session.refit import RefitRequest, RefitSetup, predict_from
+from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.control.tracking.track_frame import beside
-from acu_daemon.model import AxisLimits, Correction, sky_angle_deg
+from acu_daemon.model import AxisLimits, Correction, Model, Readings, sky_angle_deg
 from acu_daemon.orbit.look import look_at
 from acu_daemon.pointing.keyhole import follow_path, longest_window_s
 
@@ -118,3 +120,14 @@ def test_a_satellite_that_is_late_is_where_the_frame_of_the_track_has_it(where, 
             point = beside(buffer, at, (late_s, 0.0))
             apart_deg = sky_angle_deg(point.az_deg, point.el_deg, float(seen.az_deg[k]), float(seen.el_deg[k]))
             assert apart_deg < 0.001 * abs(late_s)
+
+
+@pytest.mark.parametrize("now_s", [-30.0, 0.0, 30.0])
+def test_however_far_back_a_buffer_begins_its_turn_is_the_one_asked_for_at_the_instant_of_asking(now_s):
+    setup = RefitSetup(circular(), OVERHEAD, "full", EstimatorSettings(), DRIVE)
+    now_tai_s = EPOCH_TAI_S + now_s
+    for near_az_deg in np.arange(-400.0, 400.0, 17.0).tolist():
+        request = RefitRequest(Readings.of([]), EPOCH_TAI_S - 60.0, 120.0, now_tai_s, near_az_deg)
+        buffer = predict_from(setup, None, request, Model.ELEMENTS)
+        assert abs(buffer.at(now_tai_s).az_deg - near_az_deg) <= 180.0 + 1e-6
+        assert buffer.made_at_tai_s == now_tai_s
