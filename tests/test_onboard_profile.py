@@ -7,9 +7,11 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import made_oems
 import numpy as np
 import pytest
 from made_aems import kvn, quaternions
+from made_element_sets import omm_text
 from onboard_tasks import made_scenario, made_task
 
 from acu_daemon.edge.onboard_files import load_pass
@@ -31,7 +33,9 @@ from acu_daemon.onboard.recheck import check_certificate, check_peaks
 from acu_daemon.onboard.relief import least_interruption, least_margin_deg
 from acu_daemon.onboard.scenarios import DAEJEON
 from acu_daemon.orbit.frames import station_itrs_m, teme_from_itrs
+from acu_daemon.orbit.tle import parse_tle
 from acu_daemon.report.onboard_text import header
+from acu_daemon.units import DAY_S
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "config" / "onboard"
 FILE_DEG = 1e-6
@@ -123,6 +127,26 @@ def test_in_the_middle_of_a_target_the_body_points_at_it() -> None:
 def test_a_strip_on_another_day_is_warned_of(tmp_path: Path) -> None:
     planned = load_pass(pass_file(tmp_path, ("2026-11-30T04:27:20Z", "2026-11-29T04:27:20Z")))
     assert ["the strip of 2026-11-29T04:27:20Z lies outside the pass" in one for one in planned.warnings] == [True]
+
+
+@pytest.mark.parametrize(("from_s", "to_s", "warned"), [(-600.0, 600.0, 0), (60.0, 600.0, 1), (-600.0, -120.0, 1)])
+def test_a_pass_that_the_ephemeris_cuts_is_warned_of(tmp_path: Path, from_s: float, to_s: float, warned: int) -> None:
+    whole = load_pass(EXAMPLE / "pass.toml")
+    tai_s = np.arange(whole.seen.rise_tai_s + from_s, whole.seen.set_tai_s + to_s, 30.0)
+    (tmp_path / "a.oem").write_text(made_oems.kvn((tai_s, *whole.propagator.states_teme(tai_s))))
+    planned = load_pass(pass_file(tmp_path, ('kind = "tle"', 'kind = "oem"'), ("kompsat-3-alike.tle", "a.oem")))
+    told = [one for one in planned.warnings if "the pass is cut where the ephemeris ends" in one]
+    assert len(told) == warned
+    assert (planned.seen.duration_s < whole.seen.duration_s - 30.0) == bool(warned)
+
+
+def test_a_pass_of_many_hours_is_refused(tmp_path: Path) -> None:
+    ((low,), _) = parse_tle((EXAMPLE / "kompsat-3-alike.tle").read_text(), "made")
+    (tmp_path / "high.json").write_text(omm_text([replace(low, mean_motion_rad_s=4.0 * np.pi / DAY_S)]))
+    path = pass_file(tmp_path, ("kompsat-3-alike.tle", "high.json"), ('kind = "tle"', 'kind = "omm"'))
+    path.write_text(path.read_text() + "[elements.limits]\nmax_semi_major_axis_km = 30000.0\n")
+    with pytest.raises(UsageError, match="a profile is made for 2 h at the most"):
+        load_pass(path)
 
 
 @pytest.mark.parametrize("method", ["single", "three", "search", "free"])

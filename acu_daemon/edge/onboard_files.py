@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from math import isfinite
 from pathlib import Path
 
 from acu_daemon.config.onboard_tables import PassFile, read_pass
@@ -23,6 +24,8 @@ from acu_daemon.units import DAY_S
 
 _SEARCH_S = DAY_S
 _SHORTEST_PASS_S = 30.0
+_LONGEST_PASS_S = 2.0 * 3600.0  # of one profile: the plan's time grows with more than its length
+_EDGE_S = 1.0
 _TOLD = 5
 
 
@@ -75,7 +78,7 @@ def load_pass(path: Path) -> PlannedPass:
     file = read_pass(path)
     loaded = _elements(file, path)
     seen = _first_pass(file, loaded.propagator, loaded.label)
-    warnings = list(loaded.warnings)
+    warnings = [*loaded.warnings, *_cut(loaded.propagator, seen)]
     attitude: Attitude
     if file.attitude.file is not None:
         attitude, doubts = _from_file(file, path.parent / file.attitude.file)
@@ -110,9 +113,30 @@ def _first_pass(file: PassFile, propagator: Propagator, label: str) -> Pass:
         raise UsageError(
             f"{label} is never above {when.min_elevation_deg:g} deg for {_SHORTEST_PASS_S:.0f} s over {station.name} "
             f"within a day from {utc_text(when.from_utc, 0)}: change from_utc, lower min_elevation_deg, or look "
-            "whether the station's latitude and longitude are right"
+            f"whether the station's latitude and longitude are right{_covered(propagator)}"
         )
-    return long[0]
+    seen = long[0]
+    if seen.duration_s > _LONGEST_PASS_S:
+        raise UsageError(
+            f"the pass lasts {seen.duration_s / 3600.0:.1f} h, a profile is made for {_LONGEST_PASS_S / 3600.0:g} h at "
+            "the most: raise min_elevation_deg, or set from_utc later in the pass"
+        )
+    return seen
+
+
+def _covered(propagator: Propagator) -> str:
+    spans = [f"{utc_text(start, 0)} to {utc_text(end, 0)}" for start, end in spans_tai_s(propagator) if isfinite(start)]
+    return f"; the ephemeris covers {' and '.join(spans)}" if spans else ""
+
+
+def _cut(propagator: Propagator, seen: Pass) -> list[str]:
+    """What is said of a pass of which the ephemeris covers a part only."""
+    if not any(
+        abs(seen.rise_tai_s - start) < _EDGE_S or abs(seen.set_tai_s - end) < _EDGE_S
+        for start, end in spans_tai_s(propagator)
+    ):
+        return []
+    return [f"the pass is cut where the ephemeris ends; the profile is of that part alone{_covered(propagator)}"]
 
 
 def _holds(file: PassFile, propagator: Propagator) -> list[Hold]:

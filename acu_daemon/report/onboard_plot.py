@@ -21,6 +21,7 @@ LABELS = {"single": "station", "three": "three stations", "search": "searching",
 TUBE, PAIR, CAMERA = "#dce9e4", "#c8553d", "#f3e3c3"
 MARGINS_DEG = np.linspace(0.25, 4.0, 16)
 _LEAST_RATE = 1e-3  # of the logarithmic scale
+_FAR = 2.0
 
 
 def plot_profile(
@@ -157,9 +158,13 @@ def _draw_margins(axes: Axes, task: Task, profiles: Mapping[str, Profile]) -> No
         axes.plot(
             task.margin_deg, peak_rate_deg_s(profile.azimuth, task.view), "o", color=COLOURS[name], label=LABELS[name]
         )
-    if np.isfinite(task.azimuth.max_rate_deg_s):
-        axes.axhline(task.azimuth.max_rate_deg_s, color=PAIR, linestyle=":", label="limit")
-    axes.set_ylim(bottom=0.0)
+    top = axes.get_ylim()[1]
+    if np.isfinite(limit := task.azimuth.max_rate_deg_s):
+        is_shown = limit < _FAR * top  # farther up it would press the rest to the axis
+        label = "limit" if is_shown else f"limit {limit:g}, above"
+        axes.axhline(limit, color=PAIR, linestyle=":", label=label)
+        top = max(top, 1.05 * limit) if is_shown else top
+    axes.set_ylim(0.0, top)
     axes.set_xlabel("margin, deg")
     axes.set_ylabel("largest azimuth rate, deg/s")
     axes.set_title("Rate against margin", fontsize=10)
