@@ -30,7 +30,7 @@ from flights import (
 
 from acu_daemon.assist.session.refit import RefitReply, RefitRequest, RefitSetup, predict_from
 from acu_daemon.cli.virtual_pass import Flight, ScriptAccess
-from acu_daemon.config.station_tables import LEAST_LOW_WATER_S
+from acu_daemon.config.tracking_tables import LEAST_LOW_WATER_S
 from acu_daemon.daemon.background import RETRY_S, fit_deadline_s
 from acu_daemon.daemon.live import live_text
 from acu_daemon.edge.clock import LoopClock

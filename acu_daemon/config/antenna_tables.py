@@ -13,14 +13,33 @@ from acu_daemon.pointing.refraction import MOST_N, Refraction, traced
 
 REFRACTION_BY_DEFAULT = False  # of daemon and simulator alike, where [atmosphere] refraction is left out
 SCALE_SIGMA = 0.1  # of the refraction, against the weather told
+SUM = f"{MOST_DEG:g} with CA, NPAE, AN and AW in sum, without signs"
 MOST_FROM_STANDARD_PRESSURE = 0.15  # weather is within 0.06; more is a pressure reduced to sea level
 
 
 class AtmosphereSection(Section):
-    refraction: bool | None = None
-    pressure_hpa: float | None = Field(default=None, ge=200, le=1100)
-    temperature_c: float | None = Field(default=None, ge=-80, le=60)
-    humidity_percent: float | None = Field(default=None, ge=0, le=100)
+    refraction: bool | None = Field(
+        default=None,
+        description=(
+            "Whether there is air; left out: no for the daemon, and what the scenario says for `fake-acu`.  Decides "
+            "whether directions are raised by refraction: 0.2 deg at 5 deg of elevation, 0.03 at 30."
+        ),
+    )
+    pressure_hpa: float | None = Field(
+        default=None,
+        ge=200,
+        le=1100,
+        json_schema_extra={"range": "within 15 % of what is usual at height_m"},
+        description=(
+            "Pressure at the antenna, not reduced to sea level; left out: the standard air's.  Decides the refraction."
+        ),
+    )
+    temperature_c: float | None = Field(
+        default=None, ge=-80, le=60, description="Temperature; left out: the standard air's.  Decides the same."
+    )
+    humidity_percent: float | None = Field(
+        default=None, ge=0, le=100, description="Relative humidity; left out: the standard air's.  Decides the same."
+    )
 
     @property
     def has_refraction(self) -> bool:
@@ -64,20 +83,93 @@ class AtmosphereSection(Section):
 class MountSection(Section):
     """What a survey gave, encoder = apparent direction + terms; a sigma is 1 sigma, None: not surveyed."""
 
-    ia_deg: float = Field(default=0.0, ge=-180, le=180)
-    ie_deg: float = Field(default=0.0, ge=-10, le=10)
-    ca_deg: float = 0.0
-    npae_deg: float = 0.0
-    an_deg: float = 0.0
-    aw_deg: float = 0.0
-    tf_deg: float = Field(default=0.0, ge=-1, le=1)
-    ia_sigma_deg: float | None = Field(default=None, ge=0, le=10)
-    ie_sigma_deg: float | None = Field(default=None, ge=0, le=10)
-    ca_sigma_deg: float | None = Field(default=None, ge=0, le=1)
-    npae_sigma_deg: float | None = Field(default=None, ge=0, le=1)
-    an_sigma_deg: float | None = Field(default=None, ge=0, le=1)
-    aw_sigma_deg: float | None = Field(default=None, ge=0, le=1)
-    tf_sigma_deg: float | None = Field(default=None, ge=0, le=1)
+    ia_deg: float = Field(
+        default=0.0,
+        ge=-180,
+        le=180,
+        description="The azimuth encoder reads high (IA).  Decides what the encoders show, in readings and commands.",
+    )
+    ie_deg: float = Field(
+        default=0.0,
+        ge=-10,
+        le=10,
+        description="The elevation encoder reads high (IE).  Decides what the encoders show, in readings and commands.",
+    )
+    ca_deg: float = Field(
+        default=0.0,
+        json_schema_extra={"range": SUM},
+        description=(
+            "The beam lies left of the perpendicular to the elevation axis (CA).  Decides what the encoders show, in "
+            "readings and commands."
+        ),
+    )
+    npae_deg: float = Field(
+        default=0.0,
+        json_schema_extra={"range": SUM},
+        description=(
+            "The elevation axis's right end is high (NPAE).  Decides what the encoders show, in readings and commands."
+        ),
+    )
+    an_deg: float = Field(
+        default=0.0,
+        json_schema_extra={"range": SUM},
+        description="The azimuth axis leans north (AN).  Decides what the encoders show, in readings and commands.",
+    )
+    aw_deg: float = Field(
+        default=0.0,
+        json_schema_extra={"range": SUM},
+        description="The azimuth axis leans west (AW).  Decides what the encoders show, in readings and commands.",
+    )
+    tf_deg: float = Field(
+        default=0.0,
+        ge=-1,
+        le=1,
+        description=(
+            "The beam sags, by this times cos(el) (TF).  Decides what the encoders show, in readings and commands."
+        ),
+    )
+    ia_sigma_deg: float | None = Field(
+        default=None,
+        ge=0,
+        le=10,
+        description="How well IA is known, 1 sigma; left out: not surveyed.  Decides nothing yet: no fit moves it.",
+    )
+    ie_sigma_deg: float | None = Field(
+        default=None,
+        ge=0,
+        le=10,
+        description="How well IE is known, 1 sigma; left out: not surveyed.  Decides nothing yet: no fit moves it.",
+    )
+    ca_sigma_deg: float | None = Field(
+        default=None,
+        ge=0,
+        le=1,
+        description="How well CA is known, 1 sigma; left out: not surveyed.  Decides nothing yet: no fit moves it.",
+    )
+    npae_sigma_deg: float | None = Field(
+        default=None,
+        ge=0,
+        le=1,
+        description="How well NPAE is known, 1 sigma; left out: not surveyed.  Decides nothing yet: no fit moves it.",
+    )
+    an_sigma_deg: float | None = Field(
+        default=None,
+        ge=0,
+        le=1,
+        description="How well AN is known, 1 sigma; left out: not surveyed.  Decides nothing yet: no fit moves it.",
+    )
+    aw_sigma_deg: float | None = Field(
+        default=None,
+        ge=0,
+        le=1,
+        description="How well AW is known, 1 sigma; left out: not surveyed.  Decides nothing yet: no fit moves it.",
+    )
+    tf_sigma_deg: float | None = Field(
+        default=None,
+        ge=0,
+        le=1,
+        description="How well TF is known, 1 sigma; left out: not surveyed.  Decides nothing yet: no fit moves it.",
+    )
 
     @model_validator(mode="after")
     def _encoders_tell_one_direction(self) -> "MountSection":

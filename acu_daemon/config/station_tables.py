@@ -1,82 +1,83 @@
-"""The tables of station.toml: keys, defaults, what each value may be."""
+"""station.toml: its tables and their keys, defaults, what each value may be."""
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 
+from acu_daemon.config.acu_tables import AcuSection
 from acu_daemon.config.antenna_tables import AtmosphereSection, MountSection, antenna_of
-from acu_daemon.config.section import Name, Positive, Section
-from acu_daemon.edge.link import make_link
-from acu_daemon.errors import UsageError
-from acu_daemon.model import AxisLimits, EarthOrientation, Site, Station
-from acu_daemon.protocol.sa3842 import address_byte
-
-LEAST_LOW_WATER_S = 4.0  # a niced fit on a busy machine takes a second: less would end good ones (daemon.background)
+from acu_daemon.config.section import Name, Section
+from acu_daemon.config.tracking_tables import ReadingsSection, ReceiverSection, TrackingSection
+from acu_daemon.model import EarthOrientation, Site, Station
 
 
 class StationSection(Section):
-    latitude_deg: float = Field(ge=-90, le=90)
-    longitude_deg: float = Field(ge=-180, le=360)
-    height_m: float = Field(ge=-500, le=9000)
-    name: Name = "station"
-    min_elevation_deg: float = Field(default=5.0, ge=0, lt=90)
-    uncertainty_m: float = Field(default=0.0, ge=0)
-
-
-class AxisSection(Section):
-    min_deg: float = Field(ge=-720, le=720)
-    max_deg: float = Field(ge=-720, le=720)
-    max_rate_deg_s: float = Field(gt=0, le=90)
-    max_acceleration_deg_s2: float = Field(gt=0, le=360)
-
-    @model_validator(mode="after")
-    def _min_below_max(self) -> "AxisSection":
-        self._must_be_below("min_deg", "max_deg")
-        return self
-
-    def limits(self) -> AxisLimits:
-        return AxisLimits(self.min_deg, self.max_deg, self.max_rate_deg_s, self.max_acceleration_deg_s2)
-
-
-class ElevationSection(AxisSection):
-    min_deg: float = Field(ge=-90, le=180)
-    max_deg: float = Field(ge=-90, le=180)
-
-
-def _address(value: object) -> str:
-    text = str(value)
-    address_byte(text)
-    return text
-
-
-def _url(value: str) -> str:
-    try:
-        make_link(value)
-    except UsageError as error:
-        raise ValueError(str(error)) from None
-    return value
-
-
-class AcuSection(Section):
-    url: Annotated[str, AfterValidator(_url)]
-    azimuth: AxisSection
-    elevation: ElevationSection
-    dialect: Literal["sa3842"] = "sa3842"
-    address: Annotated[str, BeforeValidator(_address)] = "1"
-    period_s: float = Field(default=0.1, ge=0.1, le=0.15)  # six readings must show a rate, one lost reply no lost link
-    device_delay_s: float = Field(default=0.010, ge=0, le=0.1)
-
-
-class ReceiverSection(Section):
-    beamwidth_deg: float = Field(default=1.0, gt=0, le=30)
-    lock_dwell_s: float = Field(default=1.0, ge=0, le=60)
+    latitude_deg: float = Field(
+        ge=-90,
+        le=90,
+        description=(
+            "Geodetic latitude of the antenna (WGS84), north positive.  Decides where the satellite is seen: 0.01 deg "
+            "are 1.1 km."
+        ),
+    )
+    longitude_deg: float = Field(
+        ge=-180, le=360, description="Longitude of the antenna, east positive.  Decides the same."
+    )
+    height_m: float = Field(
+        ge=-500,
+        le=9000,
+        description=(
+            "Height over the ellipsoid (WGS84), not over the sea.  Decides the direction of near satellites, and the "
+            "standard air."
+        ),
+    )
+    name: Name = Field(
+        default="station",
+        description=(
+            "The station's name, for people.  Decides the folder of the antenna's state, with the ACU's address."
+        ),
+    )
+    min_elevation_deg: float = Field(
+        default=5.0,
+        ge=0,
+        lt=90,
+        description="The horizon of the station.  Decides when a pass begins and ends, and how low a search may look.",
+    )
+    uncertainty_m: float = Field(
+        default=0.0,
+        ge=0,
+        description=(
+            "How well the place is known over the ground, 1 sigma.  Decides whether `full` fits the place too (above "
+            "0), and how far it may go."
+        ),
+    )
 
 
 class TimeSection(Section):
-    ut1_utc_s: float = Field(default=0.0, ge=-1, le=1)
-    polar_motion_x_arcsec: float = Field(default=0.0, ge=-2, le=2)
-    polar_motion_y_arcsec: float = Field(default=0.0, ge=-2, le=2)
-    earth_orientation: Name | None = None  # a finals2000A or C04 file, in place of the three numbers
+    ut1_utc_s: float = Field(
+        default=0.0,
+        ge=-1,
+        le=1,
+        description=(
+            "UT1 - UTC of the date, from IERS Bulletin A.  Decides how far the Earth has turned: 0.5 s is 0.01 to "
+            "0.03 deg on a low orbit."
+        ),
+    )
+    polar_motion_x_arcsec: float = Field(
+        default=0.0,
+        ge=-2,
+        le=2,
+        description="Polar motion x of the date, from the same.  Decides the station's place by up to 10 m.",
+    )
+    polar_motion_y_arcsec: float = Field(default=0.0, ge=-2, le=2, description="Polar motion y.  Decides the same.")
+    earth_orientation: Name | None = Field(
+        default=None,
+        json_schema_extra={"range": "a path"},
+        description=(
+            "A file of the IERS (finals2000A or C04) beside station.toml.  Decides the three numbers above by the "
+            "date of the pass; give the file or the numbers."
+        ),
+    )
 
     @model_validator(mode="after")
     def _numbers_or_a_file(self) -> "TimeSection":
@@ -92,41 +93,49 @@ class TimeSection(Section):
         return EarthOrientation(self.ut1_utc_s, self.polar_motion_x_arcsec, self.polar_motion_y_arcsec)
 
 
-class ReadingsSection(Section):
-    sigma_azimuth_deg: Positive = 0.05
-    sigma_elevation_deg: Positive = 0.05
-    bias_sigma_azimuth_deg: float = Field(default=0.1, ge=0)
-    bias_sigma_elevation_deg: float = Field(default=0.1, ge=0)
-    bias_sigma_azimuth_sec_deg: float = Field(default=0.003, ge=0)  # grows as 1 / cos(el): the axes are not square
-    bias_sigma_elevation_cot_deg: float = Field(default=0.0, ge=0)  # grows as cot(el), towards the horizon
-
-
-class TrackingSection(Section):
-    horizon_s: float = Field(default=90.0, ge=10, le=600)
-    low_water_s: float = Field(default=30.0, le=500)
-    max_fit_elevation_deg: float = Field(default=80.0, gt=0, le=90)
-    estimator: Literal["circular", "deterministic", "kalman", "full"] = "full"
-    preposition_s: float = Field(default=120.0, ge=10, le=3600)
-    search_along_s: Positive = 10.0
-    search_across_deg: Positive = 2.0
-
-    @model_validator(mode="after")
-    def _water_below_horizon(self) -> "TrackingSection":
-        if self.low_water_s < LEAST_LOW_WATER_S:
-            raise ValueError(
-                f"low_water_s = {self.low_water_s:g}: expected at least {LEAST_LOW_WATER_S:g}, of which half is for an "
-                "answer of the fit process, also one that starts, and half for a buffer made without it"
-            )
-        self._must_be_below("low_water_s", "horizon_s")
-        return self
-
-
 class SafetySection(Section):
-    arm: Literal["auto", "manual"] = "auto"
-    register_watchdog_s: float = Field(default=5.0, ge=0, le=600)  # the ACU's W; 0: it is not touched
-    following_error_deg: float = Field(default=1.0, ge=0.2, le=30)  # on the sky; less is lag, noise and wind
-    following_error_s: float = Field(default=2.0, ge=0, le=60)  # 0: the axes are not watched
-    clock_alarm_beam_fraction: float = Field(default=0.1, gt=0, le=10)
+    arm: Literal["auto", "manual"] = Field(
+        default="auto",
+        description=(
+            "`manual`: nothing is written until a person says `acu-daemon arm`.  Decides whether the daemon may move "
+            "the antenna from its start on."
+        ),
+    )
+    register_watchdog_s: float = Field(
+        default=5.0,
+        ge=0,
+        le=600,
+        json_schema_extra={"range": "0, or 2 to 600"},
+        description=(
+            "The ACU stops the antenna when its registers go unwritten for so long; 0: its watchdog is not touched.  "
+            "Decides what happens when the daemon dies and does not come back."
+        ),
+    )
+    following_error_deg: float = Field(
+        default=1.0,
+        ge=0.2,
+        le=30,
+        description=(
+            "On the sky: what an axis may be off its command, beyond lag, noise and wind.  Decides when an axis that "
+            "stands still, runs away or turns the wrong way is stopped and latched."
+        ),
+    )
+    following_error_s: float = Field(
+        default=2.0,
+        ge=0,
+        le=60,
+        json_schema_extra={"range": "0, or 0.5 to 60"},
+        description="For how long it may be; 0: the axes are not watched.  Decides the same.",
+    )
+    clock_alarm_beam_fraction: float = Field(
+        default=0.1,
+        gt=0,
+        le=10,
+        description=(
+            "A clock whose error moves the satellite by this share of the beam, at the present rate, is an alarm.  "
+            "Decides what is told about the clock, not what is commanded."
+        ),
+    )
 
     @model_validator(mode="after")
     def _none_or_enough(self) -> "SafetySection":
@@ -137,15 +146,29 @@ class SafetySection(Section):
 
 
 class StationFile(Section):
-    station: StationSection
-    acu: AcuSection
-    receiver: ReceiverSection = ReceiverSection()
-    time: TimeSection = TimeSection()
-    readings: ReadingsSection = ReadingsSection()
-    tracking: TrackingSection = TrackingSection()
-    safety: SafetySection = SafetySection()
-    atmosphere: AtmosphereSection = AtmosphereSection()
-    mount: MountSection = MountSection()
+    station: StationSection = Field(description="Where the antenna stands.")
+    acu: AcuSection = Field(description="The antenna control unit and the line to it.")
+    receiver: ReceiverSection = Field(default=ReceiverSection(), description="What the antenna receives with.")
+    time: TimeSection = Field(
+        default=TimeSection(), description="How the Earth is turned; the clock itself is the system's."
+    )
+    readings: ReadingsSection = Field(default=ReadingsSection(), description="What the ACU's angles are worth.")
+    tracking: TrackingSection = Field(
+        default=TrackingSection(), description="How the orbit is fitted, predicted and searched."
+    )
+    safety: SafetySection = Field(
+        default=SafetySection(), description="What must hold before and while the antenna moves."
+    )
+    atmosphere: AtmosphereSection = Field(
+        default=AtmosphereSection(), description="The air that the antenna looks through (docs/antenna-model.md)."
+    )
+    mount: MountSection = Field(
+        default=MountSection(),
+        description=(
+            "What a survey of the mount gave: encoder = apparent direction + terms (docs/antenna-model.md has their "
+            "signs)."
+        ),
+    )
 
     @model_validator(mode="after")
     def _is_some_air(self) -> "StationFile":

@@ -1,0 +1,117 @@
+"""[acu] of station.toml: the line to the antenna control unit, and the limits of its axes."""
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+
+from acu_daemon.config.section import Section
+from acu_daemon.edge.link import make_link
+from acu_daemon.errors import UsageError
+from acu_daemon.model import AxisLimits
+from acu_daemon.protocol.sa3842 import address_byte
+
+
+class AxisSection(Section):
+    min_deg: float = Field(
+        ge=-720,
+        le=720,
+        description=(
+            "Lower soft limit, encoder frame; negative angles are further turns of the cable.  Decides where commands "
+            "end, and which turn a pass is flown on."
+        ),
+    )
+    max_deg: float = Field(
+        ge=-720,
+        le=720,
+        json_schema_extra={"range": "min_deg to 720"},
+        description="Upper soft limit.  Decides the same.",
+    )
+    max_rate_deg_s: float = Field(
+        gt=0,
+        le=90,
+        description=(
+            "The fastest that the drive turns.  Decides how fast commands move, when the antenna sets out, and what "
+            "of a pass near the zenith cannot be followed."
+        ),
+    )
+    max_acceleration_deg_s2: float = Field(
+        gt=0,
+        le=360,
+        description=(
+            "How fast the drive gets there.  Decides the way to the rise, and how long a brake takes before an axis "
+            "is called out of control."
+        ),
+    )
+
+    @model_validator(mode="after")
+    def _min_below_max(self) -> "AxisSection":
+        self._must_be_below("min_deg", "max_deg")
+        return self
+
+    def limits(self) -> AxisLimits:
+        return AxisLimits(self.min_deg, self.max_deg, self.max_rate_deg_s, self.max_acceleration_deg_s2)
+
+
+class ElevationSection(AxisSection):
+    min_deg: float = Field(ge=-90, le=180, description="Lower soft limit, encoder frame.  Decides where commands end.")
+    max_deg: float = Field(
+        ge=-90,
+        le=180,
+        json_schema_extra={"range": "min_deg to 180"},
+        description="Upper soft limit; above 90 the antenna can plunge.  Decides the same.",
+    )
+
+
+def _address(value: object) -> str:
+    text = str(value)
+    address_byte(text)
+    return text
+
+
+def _url(value: str) -> str:
+    try:
+        make_link(value)
+    except UsageError as error:
+        raise ValueError(str(error)) from None
+    return value
+
+
+class AcuSection(Section):
+    url: Annotated[str, AfterValidator(_url)] = Field(
+        json_schema_extra={"range": "tcp:// or serial://"},
+        description=(
+            "The link: tcp://HOST:PORT, or serial:///dev/DEVICE?baud=9600&format=8N1.  Decides how bytes travel; "
+            "`baud` also how long a frame is on the wire, over a terminal server too (tcp://HOST:PORT?baud=9600)."
+        ),
+    )
+    azimuth: AxisSection = Field(description="Limits of the azimuth axis and its drive.")
+    elevation: ElevationSection = Field(description="Limits of the elevation axis and its drive.")
+    dialect: Literal["sa3842"] = Field(
+        default="sa3842",
+        description="The wire protocol (docs/protocol.md).  Decides which codec is used; there is one.",
+    )
+    address: Annotated[str, BeforeValidator(_address)] = Field(
+        default="1",
+        json_schema_extra={"range": "`1` to `o`"},
+        description=(
+            "The ACU's address on the line, one character.  Decides which ACU answers where several share a line."
+        ),
+    )
+    period_s: float = Field(
+        default=0.1,
+        ge=0.1,
+        le=0.15,
+        description=(
+            "Time between two ticks.  Decides how often the ACU is polled and its registers are written; longer only "
+            "for a slow line."
+        ),
+    )
+    device_delay_s: float = Field(
+        default=0.010,
+        ge=0,
+        le=0.1,
+        description=(
+            "From the end of a request until the ACU samples its angles.  Decides the time tag of readings, and for "
+            "which moment commands are computed."
+        ),
+    )

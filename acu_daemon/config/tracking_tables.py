@@ -1,0 +1,133 @@
+"""[receiver], [readings] and [tracking] of station.toml; a satellite's file may have its own values."""
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from acu_daemon.config.section import Positive, Section
+
+LEAST_LOW_WATER_S = 4.0  # a niced fit on a busy machine takes a second: less would end good ones (daemon.background)
+
+
+class ReceiverSection(Section):
+    beamwidth_deg: float = Field(
+        default=1.0,
+        gt=0,
+        le=30,
+        description=(
+            "Full width of the beam at half power.  Decides what counts as on the path (half of it), when a hold is "
+            "no longer sure, the rows of a search, and which readings are a side lobe's."
+        ),
+    )
+    lock_dwell_s: float = Field(
+        default=1.0,
+        ge=0,
+        le=60,
+        description=(
+            "How long the signal must be acquired before its readings count.  Decides how soon the first fit comes, "
+            "and what a glimpse of signal is worth."
+        ),
+    )
+
+
+class ReadingsSection(Section):
+    sigma_azimuth_deg: Positive = Field(
+        default=0.05,
+        description=(
+            "Noise of a reading in azimuth, across the elevation (times cos(el)), 1 sigma.  Decides how soon a fit "
+            "leaves its prior, and the size of its ellipses."
+        ),
+    )
+    sigma_elevation_deg: Positive = Field(default=0.05, description="The same in elevation.  Decides the same.")
+    bias_sigma_azimuth_deg: float = Field(
+        default=0.1,
+        ge=0,
+        description=(
+            "How far the azimuth encoder may be off, 1 sigma, not times cos(el); 0: exactly aligned.  Decides what "
+            "`full` takes for a bias: it limits its first minute."
+        ),
+    )
+    bias_sigma_elevation_deg: float = Field(default=0.1, ge=0, description="The same in elevation.  Decides the same.")
+    bias_sigma_azimuth_sec_deg: float = Field(
+        default=0.003,
+        ge=0,
+        description="A part that grows with 1 / cos(el): axes that are not square.  Decides the same.",
+    )
+    bias_sigma_elevation_cot_deg: float = Field(
+        default=0.0,
+        ge=0,
+        description=(
+            "A part that grows with cot(el): an antenna that sags.  Decides the same; costs accuracy where the "
+            "antenna does not (docs/accuracy.md)."
+        ),
+    )
+
+
+class TrackingSection(Section):
+    horizon_s: float = Field(
+        default=90.0,
+        ge=10,
+        le=600,
+        description=(
+            "How far ahead of now the prediction buffer reaches.  Decides how long the antenna is led when nothing "
+            "refills the buffer, and how far `prediction good for` can look."
+        ),
+    )
+    low_water_s: float = Field(
+        default=30.0,
+        le=500,
+        json_schema_extra={"range": "4 to 500, below horizon_s"},
+        description=(
+            "The buffer is made anew when less than this is left.  Decides how long the fit process may take: half of "
+            "it, 5 s at most; the other half is for a buffer made without it."
+        ),
+    )
+    max_fit_elevation_deg: float = Field(
+        default=80.0,
+        gt=0,
+        le=90,
+        description=(
+            "Readings above it are not fitted: the azimuth drive lags near the zenith.  Decides what an overhead pass "
+            "adds to the fit."
+        ),
+    )
+    estimator: Literal["circular", "deterministic", "kalman", "full"] = Field(
+        default="full",
+        description=(
+            "How the orbit is fitted (docs/estimation.md): `full`, or one of the papers' three.  Decides how good a "
+            "hold is, and whether its sigma is known."
+        ),
+    )
+    preposition_s: float = Field(
+        default=120.0,
+        ge=10,
+        le=3600,
+        description=(
+            "At least so long before the rise the antenna sets out, earlier where its way takes longer.  Decides when "
+            "it begins to move."
+        ),
+    )
+    search_along_s: Positive = Field(
+        default=10.0,
+        description=(
+            "Seconds early and late that a search covers first; 3 sigma of the prediction come after, to 120 s.  "
+            "Decides how long it takes until a search looks elsewhere."
+        ),
+    )
+    search_across_deg: Positive = Field(
+        default=2.0,
+        description=(
+            "Degrees to the right and left of the path that a search covers first, 3 sigma after, to 10 deg.  Decides "
+            "the same."
+        ),
+    )
+
+    @model_validator(mode="after")
+    def _water_below_horizon(self) -> "TrackingSection":
+        if self.low_water_s < LEAST_LOW_WATER_S:
+            raise ValueError(
+                f"low_water_s = {self.low_water_s:g}: expected at least {LEAST_LOW_WATER_S:g}, of which half is for an "
+                "answer of the fit process, also one that starts, and half for a buffer made without it"
+            )
+        self._must_be_below("low_water_s", "horizon_s")
+        return self
