@@ -27,8 +27,8 @@ from acu_daemon.cli.options import (
     parse_utc,
 )
 from acu_daemon.cli.own_daemon import OwnDaemon, find_daemon
-from acu_daemon.config.load import load_station, satellite_names
 from acu_daemon.config.acu_tables import AcuSection
+from acu_daemon.config.load import load_station, satellite_names
 from acu_daemon.config.station_tables import StationFile
 from acu_daemon.control.tracking.pass_plan import plan_pass
 from acu_daemon.daemon.health import status_line

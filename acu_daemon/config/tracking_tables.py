@@ -57,8 +57,8 @@ class ReadingsSection(Section):
         default=0.0,
         ge=0,
         description=(
-            "A part that grows with cot(el): an antenna that sags.  Decides the same; costs accuracy where the "
-            "antenna does not (docs/accuracy.md)."
+            "A part that grows with cot(el): an antenna that sags; where there is air, a tenth of its refraction is "
+            "added.  Decides the same; costs accuracy where the antenna does not sag (docs/accuracy.md)."
         ),
     )
 
