@@ -9,13 +9,13 @@ from acu_daemon.config.station_tables import StationFile
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.axis_watch import Bounds
 
-HALF_SERVO_TICK_S = 0.010  # ICD section 6: a command waits for half a 50 Hz servo tick on average
+HALF_SERVO_TICK_S = 0.010  # a command waits for half a 50 Hz servo tick on average: docs/protocol.md, Servo
 
 
 def control_config(station: StationFile, satellite: SatelliteFile, byte_time_s: float) -> ControlConfig:
     """What the decision of a tick needs; byte_time_s is the wire time of one character (0 on TCP)."""
     acu = station.acu
-    wire_s = 17 * byte_time_s  # a WRITE AND STATUS command, ICD section 4
+    wire_s = 17 * byte_time_s  # a WRITE AND STATUS command: docs/protocol.md, Messages
     return ControlConfig(
         azimuth=acu.azimuth.limits(),
         elevation=acu.elevation.limits(),

@@ -13,9 +13,9 @@ class ControlConfig:
     azimuth: AxisLimits
     elevation: AxisLimits
     period_s: float = 0.1
-    sample_delay_s: float = 0.010  # start of WRITE AND STATUS to the sample of the angles, ICD section 6
+    sample_delay_s: float = 0.010  # start of WRITE AND STATUS to the sample of the angles: docs/protocol.md, Time tags
     poll_sample_delay_s: float = 0.010  # the same for STATUS POLL
-    effect_delay_s: float = 0.020  # start of a write to the moment the command takes effect, ICD section 6
+    effect_delay_s: float = 0.020  # start of a write to its effect: docs/protocol.md, Time tags
     beamwidth_deg: float = 1.0
     lock_dwell_s: float = 1.0
     min_elevation_deg: float = 5.0

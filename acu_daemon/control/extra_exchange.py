@@ -46,7 +46,7 @@ def needs_no_poll(state: ControlState, extra: Command, now_tai_s: float, config:
 
 
 def _are_registers_fresh(state: ControlState, now_tai_s: float) -> bool:
-    """Whether a mode may be selected: the registers first, the mode second (ICD section 5)."""
+    """Whether a mode may be selected: the registers first, the mode second (docs/protocol.md, Behaviour)."""
     in_force = state.registers.in_force
     if state.startup.stage is not StartStage.READY or in_force is None:
         return False

@@ -1,4 +1,4 @@
-"""The order of a start, and of a fresh start after the link was lost (design section 3).
+"""The order of a start, and of a fresh start after the link was lost (docs/protocol.md, The order of a start).
 
 Poll, identify, read the registers (for the tilt), free the sector preference, write the present angles, read them back.
 Only then is a path written or a mode selected, and the register watchdog set.  Disarmed, it stops before the first
@@ -32,9 +32,9 @@ from acu_daemon.protocol.messages import (
 )
 from acu_daemon.units import wrap_180
 
-SECTOR = "S"  # the ACU's sector preference; 0: a register is followed the nearest way (ICD section 4)
+SECTOR = "S"  # the ACU's sector preference; 0: a register is followed the nearest way (docs/protocol.md, Parameters)
 WATCHDOG = "W"  # the ACU's register watchdog: unwritten registers that are followed put it in STANDBY
-WATCHDOG_LSB_S = 0.02  # ICD section 3
+WATCHDOG_LSB_S = 0.02  # docs/protocol.md, Parameters
 WATCHDOG_TRY_S = 2.0  # without the answer that is hoped for, and the ACU counts as having no watchdog
 
 

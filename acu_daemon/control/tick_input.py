@@ -49,9 +49,9 @@ class Observation:
     extra: Exchange | None = None
     refused: Nak | None = None  # the ACU refused the register write
     silence_s: float = 0.0
-    must_poll: bool = False  # the last exchange failed: the next command is a poll (ICD section 1)
+    must_poll: bool = False  # the last exchange failed: the next command is a poll (docs/protocol.md, Late replies)
     requests: tuple[Request, ...] = ()
-    has_room: bool = True  # the computed cycle leaves room for a second exchange beside the write (ICD section 6)
+    has_room: bool = True  # the cycle leaves room for an exchange beside the write (docs/protocol.md, Timing)
 
 
 @dataclass(frozen=True, slots=True)

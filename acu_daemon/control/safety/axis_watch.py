@@ -69,7 +69,7 @@ class AxisWatch:
 
 
 def duty_of(status: Status) -> Duty:
-    """What the mode asks of the axes (ICD section 5)."""
+    """What the mode asks of the axes (docs/protocol.md, Behaviour)."""
     if status.mode in UNWATCHED_MODES or not status.is_remote_enabled:
         return Duty.UNWATCHED
     if status.follows_registers:

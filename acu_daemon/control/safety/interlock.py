@@ -7,7 +7,7 @@ from acu_daemon.control.tick_input import Observation
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.protocol.messages import Command, Faults, ReadFaults, Status
 
-EMERGENCY_STOP, DOOR_OPEN = 1, 2  # of the interlock nibble, ICD section 4
+EMERGENCY_STOP, DOOR_OPEN = 1, 2  # of the interlock nibble: docs/protocol.md, Fault detail
 
 
 def watch_interlock(state: ControlState, seen: Observation, config: ControlConfig) -> tuple[ControlState, str]:

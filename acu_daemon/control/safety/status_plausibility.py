@@ -23,7 +23,7 @@ DESELECTED_MODES = (AcuMode.STANDBY, AcuMode.MANUAL, AcuMode.REMOTE, AcuMode.STO
 
 
 def contradictions(status: Status) -> tuple[str, ...]:
-    """What in a status block cannot be true at once (ICD sections 3 and 5)."""
+    """What in a status block cannot be true at once (docs/protocol.md, A status that cannot be true)."""
     mode, is_selected = status.mode, status.is_autotrack_selected
     has_fault = (
         status.has_azimuth_fault or status.has_elevation_fault or status.has_tilt_fault or status.has_interlock_fault

@@ -1,8 +1,8 @@
 """On which turn of the cable wrap the antenna stands, and whether that can be true.  Pure.
 
 The encoder shows a bearing.  With a range of at most 360 deg it has one turn; with a wider one a bearing beside the
-ends has two, and ICD section 3 gives one bit to tell them apart: the half of the range.  A bit may be stuck, not driven
-or random, so it is believed only for the first place.  From there the motion is counted: between two readings no drive
+ends has two, and one bit of the status block (docs/protocol.md) tells them apart: the half of the range.  A bit may be
+stuck, not driven or random, so it is believed only for the first place.  From there the motion is counted: between two readings no drive
 makes a turn, so the turn nearest to the last place is the right one.  Three things make a place sure, whatever was
 believed: a bearing that one turn alone reaches, a limit switch at its end, and a move that only one turn explains.
 

@@ -15,7 +15,7 @@ from acu_daemon.model import Pointing, sky_angle_deg
 from acu_daemon.pointing.wrap import nearest_turn
 from acu_daemon.protocol.messages import AcuMode, Status
 
-LINK_SILENCE_S = 0.5  # ICD section 1
+LINK_SILENCE_S = 0.5  # docs/protocol.md, Link
 ON_POINT_BEAMS = 0.25
 HEARD_BEAMS = 1.0  # a signal that is heard so near to the path is the satellite's
 RESUME_DEG = 5.0  # an antenna this near to the path goes on from an interruption without a new approach
@@ -62,7 +62,7 @@ def _of_status(status: Status, *, is_stow_kept: bool) -> set[Cause]:
 
 
 def is_acquired(status: Status) -> bool:
-    """Design section 1: AUTOTRACK with ACQ set."""
+    """Whether autotrack holds a signal: AUTOTRACK with ACQ set."""
     return status.mode is AcuMode.AUTOTRACK and status.is_acquired
 
 

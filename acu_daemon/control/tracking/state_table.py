@@ -1,4 +1,4 @@
-"""The states of tracking and the one table of their transitions (design section 4).
+"""The states of tracking and the one table of their transitions (docs/status.md shows them to operators).
 
 A state is named by what steers and what would take over.  `transition` walks TABLE from the top: the first row whose
 sources hold the present state and whose cause is present wins.  Causes are found in control.tracking.causes.
