@@ -3,7 +3,8 @@
 A command repeats until the status shows it; what the ACU refuses waits.
 """
 
-from acu_daemon.control.changed import changed
+from dataclasses import replace
+
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.arming import last_command
 from acu_daemon.control.safety.interlock import question
@@ -57,16 +58,16 @@ def note_asked(state: ControlState, extra: Command | None, now_tai_s: float) -> 
     """Remember what is sent now."""
     if extra is None:
         return state
-    return changed(state, asked=changed(state.asked, command=extra, again_tai_s=now_tai_s + EXTRA_REPEAT_S))
+    return replace(state, asked=replace(state.asked, command=extra, again_tai_s=now_tai_s + EXTRA_REPEAT_S))
 
 
 def wait_after_refusal(state: ControlState, extra: Exchange, now_tai_s: float) -> ControlState:
     """Let a command wait that the ACU refused; STOP never does."""
     if not isinstance(extra.reply, Nak) or isinstance(extra.command, Stop):
         return state
-    return changed(state, asked=changed(state.asked, again_tai_s=now_tai_s + REFUSED_EXTRA_S))
+    return replace(state, asked=replace(state.asked, again_tai_s=now_tai_s + REFUSED_EXTRA_S))
 
 
 def forget_asked(state: ControlState) -> ControlState:
     """Another start asks from the beginning."""
-    return changed(state, asked=changed(state.asked, command=None))
+    return replace(state, asked=replace(state.asked, command=None))

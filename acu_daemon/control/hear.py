@@ -44,9 +44,8 @@ def _hear_status(
 ) -> tuple[ControlState, Heard]:
     tai_s = _sample_tai_s(arrival, config)
     plausibility = judge(state.plausibility, status, tai_s, config.azimuth, config.elevation)
-    state = replace(state, plausibility=plausibility)
     if not plausibility.is_believed:
-        return state, Heard(seen, doubt=plausibility.reason)
+        return replace(state, plausibility=plausibility), Heard(seen, doubt=plausibility.reason)
     reading = Reading(tai_s, status.az_deg, status.el_deg, is_acquired(status), status.agc_db)
     seen = replace(
         seen,
@@ -59,7 +58,7 @@ def _hear_status(
     if is_locked and not arrival.is_sure:
         fitting = replace(fitting, out_of_step_count=fitting.out_of_step_count + 1)
     is_to_fit = is_locked and arrival.is_sure and state.tracking.track in AUTOTRACKING and not state.encoders.problem
-    return replace(state, fitting=fitting), Heard(seen, reading, is_to_fit)
+    return replace(state, plausibility=plausibility, fitting=fitting), Heard(seen, reading, is_to_fit)
 
 
 def _sample_tai_s(arrival: Arrival, config: ControlConfig) -> float:
@@ -76,5 +75,4 @@ def _dwelt(fitting: Fitting, reading: Reading, config: ControlConfig) -> tuple[F
         return replace(fitting, acquired_since_tai_s=None, last_acquired_tai_s=None), False
     is_locked = reading.tai_s - since_tai_s >= config.lock_dwell_s - ROUNDING_S
     count = fitting.dwell_count + (not is_locked)
-    new = replace(fitting, acquired_since_tai_s=since_tai_s, last_acquired_tai_s=reading.tai_s, dwell_count=count)
-    return new, is_locked
+    return Fitting(since_tai_s, reading.tai_s, count, fitting.out_of_step_count), is_locked

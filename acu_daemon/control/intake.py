@@ -2,11 +2,10 @@
 
 from dataclasses import replace
 
-from acu_daemon.control.changed import changed
 from acu_daemon.control.orders import Event
-from acu_daemon.control.safety.encoder_watch import watch_encoders
-from acu_daemon.control.state import ControlState
-from acu_daemon.control.tick_input import Sky
+from acu_daemon.control.safety.encoder_watch import EncoderWatch, watch_encoders
+from acu_daemon.control.state import ControlState, Intake
+from acu_daemon.control.tick_input import Observation, Sky
 from acu_daemon.control.tracking.causes import is_acquired
 from acu_daemon.control.tracking.state_table import AUTOTRACKING
 from acu_daemon.model import Reading
@@ -16,23 +15,26 @@ RATE_READINGS = 6  # the rate of an axis is taken over this many readings: near 
 
 
 def take_status(
-    state: ControlState, status: Status, reading: Reading, az_deg: float, *, is_confirmed: bool
+    state: ControlState,
+    seen: Observation,
+    status: Status,
+    reading: Reading,
+    az_deg: float,
+    sky: Sky,
+    events: list[Event],
 ) -> ControlState:
-    """Remember a status and its reading.  az_deg: where the azimuth is, continuous."""
+    """Remember a status and its reading, and watch the encoders.  az_deg: where the azimuth is, continuous."""
     before = state.intake
-    intake = replace(
-        before,
+    intake = Intake(
         status=status,
         reading=reading,
-        is_place_sure=is_confirmed,
+        is_place_sure=seen.is_confirmed,
         az_deg=az_deg,
-        track_of_readings=(
-            *state.intake.track_of_readings[1 - RATE_READINGS :],
-            (reading.tai_s, az_deg, status.el_deg),
-        ),
+        track_of_readings=(*before.track_of_readings[1 - RATE_READINGS :], (reading.tai_s, az_deg, status.el_deg)),
         is_stow_kept=_is_stow_kept(state, status),
     )
-    return changed(state, intake=intake)
+    encoders = _watched(state, status, reading, sky, events) if seen.is_in_step else state.encoders
+    return replace(state, intake=intake, encoders=encoders)
 
 
 def _is_stow_kept(state: ControlState, status: Status) -> bool:
@@ -48,17 +50,15 @@ def shift_places(state: ControlState, shift_deg: float) -> ControlState:
     """Put the azimuth on another turn: by a multiple of 360 deg further on."""
     intake = state.intake
     readings = tuple((tai_s, az + shift_deg, el) for tai_s, az, el in intake.track_of_readings)
-    return changed(state, intake=changed(intake, az_deg=intake.az_deg + shift_deg, track_of_readings=readings))
+    return replace(state, intake=replace(intake, az_deg=intake.az_deg + shift_deg, track_of_readings=readings))
 
 
 def doubt_place(state: ControlState) -> ControlState:
     """After a lost link nobody knows where the antenna is, until some readings agree."""
-    return changed(state, intake=changed(state.intake, is_place_sure=False))
+    return replace(state, intake=replace(state.intake, is_place_sure=False))
 
 
-def watch_for_frozen(
-    state: ControlState, status: Status, reading: Reading, sky: Sky, events: list[Event]
-) -> ControlState:
+def _watched(state: ControlState, status: Status, reading: Reading, sky: Sky, events: list[Event]) -> EncoderWatch:
     """Watch for frozen encoders while autotrack holds the satellite."""
     is_ours = is_acquired(status) and state.tracking.track in AUTOTRACKING
     path = sky.prediction.at(reading.tai_s) if sky.prediction and is_ours else None
@@ -68,4 +68,4 @@ def watch_for_frozen(
         events.append(Event("encoder.frozen", {"problem": watch.problem, "action": "not fitted"}, is_warning=True))
     elif state.encoders.problem and not watch.problem:
         events.append(Event("encoder.moves"))
-    return changed(state, encoders=watch)
+    return watch

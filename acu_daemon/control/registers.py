@@ -6,7 +6,6 @@ Owner of `Registers` and `Refusals`.
 import math
 from dataclasses import replace
 
-from acu_daemon.control.changed import changed
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.orders import Event
 from acu_daemon.control.state import ControlState, Sent
@@ -31,8 +30,8 @@ def take_refusal(state: ControlState, now_tai_s: float, events: list[Event]) -> 
     fields = {"az_deg": sent.az_deg, "el_deg": sent.el_deg} if sent else {}
     events.append(Event("acu.refused_write", fields, is_warning=True))
     pause_s = REFUSED_PAUSE_S if is_again else 0.0
-    registers = changed(registers, refused_tai_s=now_tai_s, refused_until_tai_s=now_tai_s + pause_s)
-    return changed(state, registers=registers)
+    registers = replace(registers, refused_tai_s=now_tai_s, refused_until_tai_s=now_tai_s + pause_s)
+    return replace(state, registers=registers)
 
 
 def take_in_force(state: ControlState, seen: Observation) -> ControlState:
@@ -41,42 +40,42 @@ def take_in_force(state: ControlState, seen: Observation) -> ControlState:
     if sent is None or seen.refused is not None or seen.reading is None:
         return state
     in_force = (seen.reading.tai_s, sent.az_deg, sent.el_deg)
-    return changed(state, registers=changed(state.registers, in_force=in_force))
+    return replace(state, registers=replace(state.registers, in_force=in_force))
 
 
 def shift_registers(state: ControlState, shift_deg: float) -> ControlState:
     """Put what is in continuous azimuth on another turn: by a multiple of 360 deg further on."""
     axis_az, in_force = state.registers.axis_az, state.registers.in_force
-    registers = changed(
+    registers = replace(
         state.registers,
         axis_az=None if axis_az is None else replace(axis_az, position_deg=axis_az.position_deg + shift_deg),
         commands=(),
         in_force=None if in_force is None else (in_force[0], in_force[1] + shift_deg, in_force[2]),
     )
-    return changed(state, registers=registers)
+    return replace(state, registers=registers)
 
 
 def forget_axes(state: ControlState) -> ControlState:
     """The next write starts from where the antenna is."""
-    registers = changed(state.registers, axis_az=None, axis_el=None, was_followed=False)
-    return changed(state, registers=registers)
+    registers = replace(state.registers, axis_az=None, axis_el=None, was_followed=False)
+    return replace(state, registers=registers)
 
 
 def forget_writes(state: ControlState) -> ControlState:
     """With the link what was written last is lost."""
-    registers = changed(state.registers, axis_az=None, axis_el=None, last_write_tai_s=None, commands=())
-    return changed(state, registers=registers)
+    registers = replace(state.registers, axis_az=None, axis_el=None, last_write_tai_s=None, commands=())
+    return replace(state, registers=registers)
 
 
 def forget_in_force(state: ControlState) -> ControlState:
     """Once the antenna was stopped no register is followed."""
-    return changed(state, registers=changed(state.registers, in_force=None))
+    return replace(state, registers=replace(state.registers, in_force=None))
 
 
 def note_no_write(state: ControlState) -> ControlState:
     """A tick without a write."""
     commands = (*state.registers.commands[-2:], None)
-    return changed(state, registers=changed(state.registers, commands=commands))
+    return replace(state, registers=replace(state.registers, commands=commands))
 
 
 def refuse_input(state: ControlState, refused: str, events: list[Event]) -> ControlState:
@@ -87,13 +86,13 @@ def refuse_input(state: ControlState, refused: str, events: list[Event]) -> Cont
     if not refused and not refusals.refused_input:
         return state
     count = refusals.refusal_count + bool(refused)
-    return changed(state, refusals=changed(refusals, refused_input=refused, refusal_count=count))
+    return replace(state, refusals=replace(refusals, refused_input=refused, refusal_count=count))
 
 
 def count_refusals(state: ControlState, count: int) -> ControlState:
     """Count commands that were kept back."""
-    refusals = changed(state.refusals, refusal_count=state.refusals.refusal_count + count)
-    return changed(state, refusals=refusals)
+    refusals = replace(state.refusals, refusal_count=state.refusals.refusal_count + count)
+    return replace(state, refusals=refusals)
 
 
 def write(
@@ -139,7 +138,7 @@ def _tell(
     is_clamped = is_followed and passed.is_held_back and not passed.refusal
     if not (passed.refusal or refusals.refusal or limited or refusals.limited or is_clamped):
         return state
-    refusals = changed(
+    refusals = replace(
         refusals,
         refusal=passed.refusal,
         limited=limited,
@@ -148,7 +147,7 @@ def _tell(
         refusal_count=refusals.refusal_count + bool(passed.refusal),
         clamped_count=refusals.clamped_count + is_clamped,
     )
-    return changed(state, refusals=refusals)
+    return replace(state, refusals=refusals)
 
 
 def _sent(
@@ -170,7 +169,7 @@ def _sent(
     is_regular = abs(since_s - config.period_s) < REGULAR_SHARE * config.period_s
     is_free = is_calm and is_settled and is_regular and is_followed and registers.was_followed
     is_free = is_free and not passed.is_held_back and not passed.limited
-    registers = changed(
+    registers = replace(
         registers,
         axis_az=passed.az,
         axis_el=passed.el,
@@ -179,10 +178,10 @@ def _sent(
         commands=(*registers.commands[-2:], Sent(az_deg, el_deg, is_free)),
         goal_az_deg=goal_az_deg,
     )
-    return changed(state, registers=registers), WriteAndPoll(az_deg, el_deg, state.startup.tilt_code)
+    return replace(state, registers=registers), WriteAndPoll(az_deg, el_deg, state.startup.tilt_code)
 
 
 def note_as_if_written(state: ControlState, written: ControlState) -> ControlState:
     """What a disarmed daemon would write, for people to see: all of it but the commands, of which none was sent."""
-    registers = changed(written.registers, commands=state.registers.commands)
-    return changed(written, registers=registers)
+    registers = replace(written.registers, commands=state.registers.commands)
+    return replace(written, registers=registers)

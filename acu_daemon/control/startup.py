@@ -7,7 +7,8 @@ write.  An ACU that refuses to have its parameters read or written is taken as i
 Owner of `Startup`.
 """
 
-from acu_daemon.control.changed import changed
+from dataclasses import replace
+
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.orders import Event
 from acu_daemon.control.state import ControlState, StartStage, Startup, Watchdog
@@ -69,13 +70,13 @@ def begin_again(state: ControlState, *, keeps_watchdog: bool) -> ControlState:
     is_kept = keeps_watchdog or startup.watchdog is Watchdog.REFUSED
     watchdog = startup.watchdog if is_kept else Watchdog.UNKNOWN
     stage = min(startup.stage, StartStage.REGISTERS_KNOWN)
-    return changed(state, startup=changed(startup, stage=stage, watchdog=watchdog))
+    return replace(state, startup=replace(startup, stage=stage, watchdog=watchdog))
 
 
 def begin_after_lost_link(state: ControlState) -> ControlState:
     """Begin with the first question; the watchdog, where it was set, is set again."""
-    startup = changed(state.startup, stage=StartStage.NEW, watchdog=_unset(state.startup), watchdog_from_tai_s=None)
-    return changed(state, startup=startup)
+    startup = replace(state.startup, stage=StartStage.NEW, watchdog=_unset(state.startup), watchdog_from_tai_s=None)
+    return replace(state, startup=startup)
 
 
 def watch_for_power_cycle(state: ControlState, status: Status) -> ControlState:
@@ -87,8 +88,8 @@ def watch_for_power_cycle(state: ControlState, status: Status) -> ControlState:
     was_remote = before is not None and before.backup_selected is Backup.REMOTE
     if state.startup.stage is not StartStage.READY or not was_remote or status.backup_selected is Backup.REMOTE:
         return state
-    startup = changed(state.startup, stage=StartStage.IDENTIFIED, watchdog=_unset(state.startup))
-    return changed(state, startup=startup)
+    startup = replace(state.startup, stage=StartStage.IDENTIFIED, watchdog=_unset(state.startup))
+    return replace(state, startup=startup)
 
 
 def _unset(startup: Startup) -> Watchdog:
@@ -120,30 +121,30 @@ def after_reply(
     is_refused = isinstance(reply, Nak) and state.intake.status is not None and state.intake.status.is_remote_enabled
     match (startup.stage, command, reply):
         case (_, Stop(), Ack()):
-            startup = changed(startup, watchdog=_perhaps_set(startup, config))
+            startup = replace(startup, watchdog=_perhaps_set(startup, config))
         case (_, ReadParameter("W") | WriteParameter("W"), _):
             startup = _after_watchdog(startup, extra, now_tai_s, config, events, is_refused=is_refused)
         case (StartStage.READY, SelectBackup(), Ack()) if startup.watchdog is Watchdog.SET:
-            startup = changed(startup, watchdog=Watchdog.UNKNOWN)  # a backup to select may come from a power cycle
+            startup = replace(startup, watchdog=Watchdog.UNKNOWN)  # a backup to select may come from a power cycle
         case (StartStage.NEW, Identify(), Identity() as identity):
             startup = _identified(startup, identity, config, events)
         case (StartStage.IDENTIFIED, ReadRegisters(), RegisterContents(tilt_code=tilt_code)):
-            startup = changed(startup, stage=StartStage.REGISTERS_KNOWN, tilt_code=tilt_code)
+            startup = replace(startup, stage=StartStage.REGISTERS_KNOWN, tilt_code=tilt_code)
         case (StartStage.REGISTERS_KNOWN, ReadParameter("S"), Parameter(code=0)) | (
             StartStage.REGISTERS_KNOWN,
             WriteParameter("S"),
             Ack(),
         ):
-            startup = changed(startup, stage=StartStage.SECTOR_FREE)
+            startup = replace(startup, stage=StartStage.SECTOR_FREE)
         case (StartStage.REGISTERS_KNOWN, WriteParameter("S"), Nak()) if is_refused:
             advice = "the antenna may turn the long way round: set the ACU's parameter S to 0 by hand"
             events.append(Event("acu.sector_refused", {"advice": advice}, is_warning=True))
-            startup = changed(startup, stage=StartStage.SECTOR_FREE)
+            startup = replace(startup, stage=StartStage.SECTOR_FREE)
         case (StartStage.SECTOR_FREE, WriteRegisters() as written, Ack()):
-            startup = changed(startup, stage=StartStage.PRESENT_WRITTEN, present_deg=(written.az_deg, written.el_deg))
+            startup = replace(startup, stage=StartStage.PRESENT_WRITTEN, present_deg=(written.az_deg, written.el_deg))
         case (StartStage.PRESENT_WRITTEN, ReadRegisters(), RegisterContents() as read):
-            startup = changed(startup, stage=StartStage.READY if _matches(startup, read) else StartStage.SECTOR_FREE)
-    return state if startup is state.startup else changed(state, startup=startup)
+            startup = replace(startup, stage=StartStage.READY if _matches(startup, read) else StartStage.SECTOR_FREE)
+    return state if startup is state.startup else replace(state, startup=startup)
 
 
 def _identified(startup: Startup, identity: Identity, config: ControlConfig, events: list[Event]) -> Startup:
@@ -153,7 +154,7 @@ def _identified(startup: Startup, identity: Identity, config: ControlConfig, eve
         events.append(Event("acu.identity_doubted", {"identity": str(identity)}, is_warning=True))
     may_go_on = is_sure and (identity.is_simulated or not config.is_rehearsal)
     stage = StartStage.IDENTIFIED if may_go_on else StartStage.NEW
-    return changed(startup, stage=stage, identity=identity, is_identity_sure=is_sure)
+    return replace(startup, stage=stage, identity=identity, is_identity_sure=is_sure)
 
 
 def _perhaps_set(startup: Startup, config: ControlConfig) -> Watchdog:
@@ -174,15 +175,15 @@ def _after_watchdog(
     """The watchdog counts as set when it was read back; a clean stop has written 0."""
     if extra.command == WriteParameter(WATCHDOG, 0):
         is_done = is_refused or isinstance(extra.reply, Ack)
-        return changed(startup, watchdog=Watchdog.UNKNOWN) if is_done else startup
+        return replace(startup, watchdog=Watchdog.UNKNOWN) if is_done else startup
     if extra.reply == Parameter(WATCHDOG, watchdog_code(config)):
-        return changed(startup, watchdog=Watchdog.SET, watchdog_from_tai_s=None)
+        return replace(startup, watchdog=Watchdog.SET, watchdog_from_tai_s=None)
     from_tai_s = now_tai_s if startup.watchdog_from_tai_s is None else startup.watchdog_from_tai_s
     if is_refused or now_tai_s - from_tai_s >= WATCHDOG_TRY_S:
         advice = "if this host dies in a loss of signal, the antenna drives to its last command and stays there"
         events.append(Event("acu.watchdog_refused", {"advice": advice}, is_warning=True))
-        return changed(startup, watchdog=Watchdog.REFUSED, watchdog_from_tai_s=None)
-    return changed(startup, watchdog_from_tai_s=from_tai_s)
+        return replace(startup, watchdog=Watchdog.REFUSED, watchdog_from_tai_s=None)
+    return replace(startup, watchdog_from_tai_s=from_tai_s)
 
 
 def _matches(startup: Startup, read: RegisterContents) -> bool:

@@ -40,7 +40,7 @@ class StartStage(IntEnum):
     READY = 5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Intake:
     """The newest status and where it shows the antenna.  Owner: control.intake."""
 
@@ -52,7 +52,7 @@ class Intake:
     is_stow_kept: bool = False  # somebody stowed the antenna while we looked on: it stays, also after a lost link
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Fitting:
     """Which readings are given to the fit.  Owner: control.hear."""
 
@@ -62,7 +62,7 @@ class Fitting:
     out_of_step_count: int = 0  # locked readings that may answer an earlier command, one that had no answer in time
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Startup:
     """How far the start has come, and what it learned of the ACU.  Owner: control.startup."""
 
@@ -75,7 +75,7 @@ class Startup:
     watchdog_from_tai_s: float | None = None  # since when it is tried to set it
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Arming:
     """Whether anything may be commanded, and the STOP that is owed.  Owner: control.safety.arming."""
 
@@ -91,7 +91,7 @@ class Held:
     has_interlock_fault: bool = False  # n5.b3: the bit with which the ACU's register watchdog shows
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ForeignStop:
     """The antenna that the daemon holds until another hand's STOP.  Owner: control.safety.foreign_stop."""
 
@@ -99,14 +99,14 @@ class ForeignStop:
     is_doubted: bool = False  # found in STANDBY, by a hand or by the register watchdog: FAULT DETAIL tells
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Interlock:
     """What FAULT DETAIL was asked for.  Owner: control.safety.interlock."""
 
     faults_read: tuple[bool, ...] | None = None  # the fault bits of the status whose detail was read, while in FAULT
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Latch:
     """How the axes obey, and what latched them.  Owner: control.safety.axis_latch."""
 
@@ -123,7 +123,7 @@ class Sent:
     is_free: bool  # followed, well within what the drive can do, and not held back by the limiter
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Registers:
     """What was sent to the registers, and what they hold.  Owner: control.registers."""
 
@@ -138,7 +138,7 @@ class Registers:
     refused_until_tai_s: float = -inf
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Refusals:
     """What the daemon itself kept back, counted and told once.  Owner: control.registers."""
 
@@ -151,7 +151,7 @@ class Refusals:
     limited_count: int = 0  # writes that the limiter held at a limit of an axis
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Asked:
     """The exchange beside the writes that was ordered last.  Owner: control.extra_exchange."""
 
@@ -159,7 +159,7 @@ class Asked:
     again_tai_s: float = -inf  # until then it is not sent again
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Tracking:
     """The state of the table.  Owner: control.tracking.walk."""
 
@@ -177,7 +177,7 @@ class PathOffset:
     model: Model
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Signal:
     """What autotrack has shown of this pass's satellite.  Owner: control.tracking.path_offset."""
 
@@ -208,7 +208,7 @@ class Scan:
         return dict(self.rows)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Search:
     """The search in progress, or the last one.  Owner: control.tracking.search."""
 
@@ -216,7 +216,7 @@ class Search:
     scanned_tai_s: float = -inf  # the newest reading that the scan has taken
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Lag:
     """The lag from command to encoder, learned per axis.  Owner: control.tracking.learned_lag."""
 
@@ -224,9 +224,9 @@ class Lag:
     el: LagEstimate = LagEstimate()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ControlState:
-    """The memory of the 10 Hz decision.  Without slots, as its parts, for `changed` (control.changed)."""
+    """The memory of the 10 Hz decision."""
 
     plausibility: Plausibility = Plausibility()  # owner: control.hear
     fitting: Fitting = Fitting()

@@ -9,7 +9,7 @@ import math
 
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.extra_exchange import needs_no_poll, note_asked, wait_after_refusal, wanted_extra
-from acu_daemon.control.intake import take_status, watch_for_frozen
+from acu_daemon.control.intake import take_status
 from acu_daemon.control.orders import Event, Orders
 from acu_daemon.control.registers import (
     note_as_if_written,
@@ -70,8 +70,7 @@ def take_in(
         state, az_deg = locate_azimuth(take_in_force(state, seen), status, reading, config, events)
         state = learn_lag(state, az_deg, status.el_deg) if seen.is_in_step else state
         state = watch_for_power_cycle(state, status)
-        state = take_status(state, status, reading, az_deg, is_confirmed=seen.is_confirmed)
-        state = watch_for_frozen(state, status, reading, sky, events) if seen.is_in_step else state
+        state = take_status(state, seen, status, reading, az_deg, sky, events)
     if extra is not None:
         state = after_reply(take_stop(state, extra), extra, now_tai_s, config, events)
         state = wait_after_refusal(state, extra, now_tai_s)

@@ -38,9 +38,9 @@ class Arrival:
     is_sure: bool = True
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Observation:
-    """What the last tick brought.  Copied by `changed`."""
+    """What the last tick brought."""
 
     reading: Reading | None = None  # with the status it came from; None: no good reply to the last write or poll
     status: Status | None = None

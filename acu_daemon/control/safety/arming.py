@@ -3,7 +3,8 @@
 Disarmed, nothing is written; in mid-pass a STOP goes before that.
 """
 
-from acu_daemon.control.changed import changed
+from dataclasses import replace
+
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.startup import WATCHDOG
 from acu_daemon.control.state import Arming, ControlState, StartStage, Watchdog
@@ -15,17 +16,17 @@ NO_STOP_MODES = (AcuMode.MANUAL, AcuMode.STOWING, AcuMode.STOWED, AcuMode.FAULT)
 
 def set_armed(state: ControlState, *, is_stop_due: bool) -> ControlState:
     """A person arms."""
-    return changed(state, arming=Arming(by_people=True, is_stop_due=is_stop_due))
+    return replace(state, arming=Arming(by_people=True, is_stop_due=is_stop_due))
 
 
 def set_disarmed(state: ControlState, by: str) -> ControlState:
     """Somebody disarms.  A STOP that is owed stays so."""
-    return changed(state, arming=changed(state.arming, by_people=False, disarmed_by=by))
+    return replace(state, arming=replace(state.arming, by_people=False, disarmed_by=by))
 
 
 def owe_stop(state: ControlState, *, is_due: bool = True) -> ControlState:
     """Send STOP until it is acknowledged, or no more."""
-    return changed(state, arming=changed(state.arming, is_stop_due=is_due))
+    return replace(state, arming=replace(state.arming, is_stop_due=is_due))
 
 
 def take_stop(state: ControlState, extra: Exchange) -> ControlState:

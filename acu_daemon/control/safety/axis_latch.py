@@ -3,7 +3,8 @@
 control.safety.axis_watch judges the axes.  Owner of `Latch`.
 """
 
-from acu_daemon.control.changed import changed
+from dataclasses import replace
+
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.orders import Event
 from acu_daemon.control.safety.axis_watch import AxisSeen, duty_of, sky_scale, watch_axes
@@ -33,7 +34,7 @@ def watch_antenna(state: ControlState, seen: Observation, config: ControlConfig)
         (config.azimuth, config.elevation),
         config.following,
     )
-    return changed(state, latch=Latch(axes=axes)), problem
+    return replace(state, latch=Latch(axes=axes)), problem
 
 
 def _rates_deg_s(state: ControlState) -> tuple[float, float]:
@@ -50,14 +51,14 @@ def latch(state: ControlState, problem: str, events: list[Event]) -> ControlStat
     advice = "look, then `acu-daemon clear`"
     fields = {"problem": problem, "az_deg": state.intake.az_deg, "el_deg": el_deg, "advice": advice}
     events.append(Event("axis.latched", fields, is_warning=True))
-    return changed(state, latch=changed(state.latch, problem=problem))
+    return replace(state, latch=replace(state.latch, problem=problem))
 
 
 def clear_latch(state: ControlState) -> ControlState:
     """A person has looked at the antenna."""
-    return changed(state, latch=Latch())
+    return replace(state, latch=Latch())
 
 
 def forget_motion(state: ControlState) -> ControlState:
     """Judge the axes from the next reading on, as if none had been."""
-    return changed(state, latch=Latch(state.latch.problem))
+    return replace(state, latch=Latch(state.latch.problem))

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from enum import Enum, auto
 from math import cos, inf, radians
 
-from acu_daemon.control.changed import changed
 from acu_daemon.model import AxisLimits
 from acu_daemon.protocol.messages import AcuMode, Status
 
@@ -55,9 +54,9 @@ class AxisSeen:
     scale: float = 1.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class AxisWatch:
-    """The memory of one axis: the newest reading, and the mark.  Copied by `changed`."""
+    """The memory of one axis: the newest reading, and the mark."""
 
     last: AxisSeen | None = None
     side: int = 0  # where the command is, seen from the axis: +1, -1; 0: near enough
@@ -84,7 +83,7 @@ def watch_axis(watch: AxisWatch, seen: AxisSeen, limits: AxisLimits, bounds: Bou
         return watch, ""
     if seen.duty is Duty.UNWATCHED or last is None or _is_new(last, seen, limits, bounds):
         return _marked(AxisWatch(seen), seen, abs(seen.rate_deg_s)), ""
-    watch = changed(watch, last=seen, fast_since_tai_s=_fast_since_tai_s(watch, seen, limits, bounds))
+    watch = replace(watch, last=seen, fast_since_tai_s=_fast_since_tai_s(watch, seen, limits, bounds))
     if seen.tai_s - watch.fast_since_tai_s >= FAST_S:
         return watch, "moves faster than its drive can"
     if seen.duty is Duty.STAND:
@@ -120,7 +119,7 @@ def _braking(watch: AxisWatch, limits: AxisLimits) -> tuple[float, float]:
 
 def _wrong_for_s(watch: AxisWatch, seen: AxisSeen, *, is_wrong: bool) -> tuple[AxisWatch, float]:
     since_tai_s = min(watch.wrong_since_tai_s, seen.tai_s) if is_wrong else inf
-    return changed(watch, wrong_since_tai_s=since_tai_s), seen.tai_s - since_tai_s
+    return replace(watch, wrong_since_tai_s=since_tai_s), seen.tai_s - since_tai_s
 
 
 def _watch_standing(watch: AxisWatch, seen: AxisSeen, limits: AxisLimits, bounds: Bounds) -> tuple[AxisWatch, str]:

@@ -4,9 +4,9 @@ A status, a plan or a fit with one field that is not finite is left out whole; o
 that are not finite (`Pointing.is_finite`): the register limiter refuses them, and the last good register stays.
 """
 
+from dataclasses import replace
 from math import inf, isnan
 
-from acu_daemon.control.changed import changed
 from acu_daemon.control.tick_input import Observation, PassPlan, Sky
 from acu_daemon.model import MOST_DEG, FitResult, Prediction, Reading
 from acu_daemon.protocol.messages import Status
@@ -20,9 +20,9 @@ def finite_only(seen: Observation, sky: Sky) -> tuple[Observation, Sky, str]:
     status, reading = seen.status, seen.reading
     if (status is not None and not _is_status(status)) or (reading is not None and not _is_reading(reading)):
         refused.append("status")
-        seen = changed(seen, status=None, reading=None)
+        seen = replace(seen, status=None, reading=None)
     if isnan(seen.silence_s):
-        seen = changed(seen, silence_s=inf)
+        seen = replace(seen, silence_s=inf)
     prediction, fit, plan = sky.prediction, sky.fit, sky.plan
     if prediction is not None and not _is_prediction(prediction):
         refused.append("prediction")

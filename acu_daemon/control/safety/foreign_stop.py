@@ -1,8 +1,8 @@
 """A STOP by another hand: the antenna in STANDBY that the daemon held.  Owner of `ForeignStop`.  Pure."""
 
+from dataclasses import replace
 from math import inf
 
-from acu_daemon.control.changed import changed
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState, ForeignStop, Held, StartStage
 from acu_daemon.control.tick_input import Observation
@@ -34,7 +34,7 @@ def watch_for_stop(before: ControlState, state: ControlState, config: ControlCon
     if not is_stopped or is_new_fault or not state.is_armed(config) or state.latch.problem:
         return settle(state), False
     if may_be_watchdog:
-        return changed(state, foreign_stop=ForeignStop(held, not now.has_interlock_fault)), False
+        return replace(state, foreign_stop=ForeignStop(held, not now.has_interlock_fault)), False
     return state, True
 
 
@@ -69,7 +69,7 @@ def note_held(state: ControlState, config: ControlConfig) -> ControlState:
 def _hold(state: ControlState, held: Held | None) -> ControlState:
     if held == state.foreign_stop.held:
         return state
-    return changed(state, foreign_stop=changed(state.foreign_stop, held=held))
+    return replace(state, foreign_stop=replace(state.foreign_stop, held=held))
 
 
 def release(state: ControlState) -> ControlState:
@@ -81,9 +81,9 @@ def settle(state: ControlState) -> ControlState:
     """Doubt no more who has stopped it."""
     if not state.foreign_stop.is_doubted:
         return state
-    return changed(state, foreign_stop=ForeignStop(state.foreign_stop.held))
+    return replace(state, foreign_stop=ForeignStop(state.foreign_stop.held))
 
 
 def forget_held(state: ControlState) -> ControlState:
     """Hold the antenna no more, whoever has stopped it."""
-    return changed(state, foreign_stop=ForeignStop())
+    return replace(state, foreign_stop=ForeignStop())

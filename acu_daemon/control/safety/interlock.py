@@ -1,6 +1,7 @@
 """The interlock: what a fault is, and the emergency stop or open door that disarms.  Owner of `Interlock`.  Pure."""
 
-from acu_daemon.control.changed import changed
+from dataclasses import replace
+
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState, Interlock, StartStage
 from acu_daemon.control.tick_input import Observation
@@ -15,7 +16,7 @@ def watch_interlock(state: ControlState, seen: Observation, config: ControlConfi
     faults = seen.extra.reply if seen.extra is not None else None
     if not isinstance(faults, Faults) or state.intake.status is None:
         return state if state.tracking.track is TrackState.FAULT else forget_faults(state), ""
-    state = changed(state, interlock=Interlock(_faults(state.intake.status)))
+    state = replace(state, interlock=Interlock(_faults(state.intake.status)))
     if not faults.interlock & (EMERGENCY_STOP | DOOR_OPEN) or not state.is_armed(config):
         return state, ""
     return state, "the emergency stop" if faults.interlock & EMERGENCY_STOP else "an open door"
@@ -34,7 +35,7 @@ def question(state: ControlState) -> Command | None:
 
 def forget_faults(state: ControlState) -> ControlState:
     """The next fault is asked about anew."""
-    return state if state.interlock.faults_read is None else changed(state, interlock=Interlock())
+    return state if state.interlock.faults_read is None else replace(state, interlock=Interlock())
 
 
 def _faults(status: Status) -> tuple[bool, ...]:

@@ -2,9 +2,10 @@
 
 The encoder shows a bearing.  With a range of at most 360 deg it has one turn; with a wider one a bearing beside the
 ends has two, and one bit of the status block (docs/protocol.md) tells them apart: the half of the range.  A bit may be
-stuck, not driven or random, so it is believed only for the first place.  From there the motion is counted: between two readings no drive
-makes a turn, so the turn nearest to the last place is the right one.  Three things make a place sure, whatever was
-believed: a bearing that one turn alone reaches, a limit switch at its end, and a move that only one turn explains.
+stuck, not driven or random, so it is believed only for the first place.  From there the motion is counted: between two
+readings no drive makes a turn, so the turn nearest to the last place is the right one.  Three things make a place sure,
+whatever was believed: a bearing that one turn alone reaches, a limit switch at its end, and a move that only one turn
+explains.
 
     bearing    -270 ----- -90 ------------- 90 ----- 270       a range of -270..270: 90..270 is reached twice,
     turns      | two turns |     one turn    | two turns |      from -90 to 90 a bearing is sure
@@ -20,11 +21,10 @@ moves it.
 An azimuth that stands on a turn that is sure, or on either, is no matter of turns: it is latched.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 from math import inf
 
-from acu_daemon.control.changed import changed
 from acu_daemon.control.safety.axis_watch import BRAKING_MARGIN
 from acu_daemon.model import AxisLimits
 from acu_daemon.pointing.wrap import END_SLACK_DEG, encoder_continuous, is_one_turn, middle_deg, nearest_turn, turns_of
@@ -51,9 +51,9 @@ class Phase(Enum):
     MOVING = auto()  # by a few degrees, on the other turn
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class TurnWatch:
-    """The memory of the turn.  Copied by `changed`."""
+    """The memory of the turn."""
 
     is_sure: bool = False
     sure_count: int = 0  # of readings in a row that show the turn, as far as SURE_COUNT
@@ -98,7 +98,7 @@ def locate(watch: TurnWatch, status: Status, limits: AxisLimits, near_deg: float
         is_denied = abs(az_deg - counted_deg) > 180.0
         denied_count = (watch.denied_count + 1) % DENIED_COUNT if is_denied else 0
         az_deg = counted_deg if is_denied and denied_count else az_deg
-        watch = watch if denied_count == watch.denied_count else changed(watch, denied_count=denied_count)
+        watch = watch if denied_count == watch.denied_count else replace(watch, denied_count=denied_count)
     if is_one_turn(limits):
         return watch, az_deg
     watch = _judge_bit(watch, status, az_deg, limits)
@@ -109,7 +109,7 @@ def locate(watch: TurnWatch, status: Status, limits: AxisLimits, near_deg: float
     is_sure = count == SURE_COUNT or (watch.is_sure and near_deg is not None)
     if (is_sure, count) == (watch.is_sure, watch.sure_count):
         return watch, az_deg
-    return changed(watch, is_sure=is_sure, sure_count=count), az_deg
+    return replace(watch, is_sure=is_sure, sure_count=count), az_deg
 
 
 def _judge_bit(watch: TurnWatch, status: Status, az_deg: float, limits: AxisLimits) -> TurnWatch:
@@ -124,7 +124,7 @@ def _judge_bit(watch: TurnWatch, status: Status, az_deg: float, limits: AxisLimi
     if score == watch.bit_score:
         return watch
     wrong_half = half if score == BIT_SCORE else watch.wrong_half
-    return changed(watch, bit_score=score, wrong_half=None if score == 0 else wrong_half)
+    return replace(watch, bit_score=score, wrong_half=None if score == 0 else wrong_half)
 
 
 def other_turn(az_deg: float, limits: AxisLimits) -> float | None:
@@ -160,10 +160,10 @@ def watch_pull(
     scale: its degrees on the sky.
     """
     if not is_pulled:
-        return (watch if watch.pulled_since_tai_s == inf else changed(watch, pulled_since_tai_s=inf)), False
+        return (watch if watch.pulled_since_tai_s == inf else replace(watch, pulled_since_tai_s=inf)), False
     if watch.pulled_since_tai_s == inf:
         braking_deg = rate_deg_s**2 * BRAKING_MARGIN / (2.0 * limits.max_acceleration_deg_s2)
-        watch = changed(watch, pulled_since_tai_s=tai_s, pulled_from_deg=az_deg, braking_deg=braking_deg)
+        watch = replace(watch, pulled_since_tai_s=tai_s, pulled_from_deg=az_deg, braking_deg=braking_deg)
     is_far = abs(az_deg - watch.pulled_from_deg) > watch.braking_deg + NEARER_DEG + NOISE_DEG / scale
     return watch, is_far and tai_s - watch.pulled_since_tai_s >= PULL_S
 
@@ -187,21 +187,21 @@ def watch_goal(
         return (at_rest(watch) if watch.goal_deg is not None or watch.problem else watch), False
     side = 1 if goal_deg > az_deg else -1
     if watch.goal_deg is None or side != watch.side:
-        watch = changed(at_rest(watch), side=side, mark_deg=az_deg, mark_tai_s=tai_s)
+        watch = replace(at_rest(watch), side=side, mark_deg=az_deg, mark_tai_s=tai_s)
     if watch.goal_deg is None or abs(goal_deg - watch.goal_deg) > NEARER_DEG:
-        watch = changed(watch, goal_deg=goal_deg, way_deg=gap_deg, begun_tai_s=tai_s)
+        watch = replace(watch, goal_deg=goal_deg, way_deg=gap_deg, begun_tai_s=tai_s)
     moved_deg = side * (az_deg - watch.mark_deg)
     if moved_deg > NEARER_DEG:
-        watch = changed(watch, mark_deg=az_deg, mark_tai_s=tai_s)
+        watch = replace(watch, mark_deg=az_deg, mark_tai_s=tai_s)
     elif moved_deg < -GOAL_DEG - 2.0 * NOISE_DEG / scale:  # it brakes: from where it turns round it shall come on
-        watch = changed(watch, mark_deg=az_deg)
+        watch = replace(watch, mark_deg=az_deg)
     is_standing = tai_s - watch.mark_tai_s > PATIENCE_S + drive_s(STEP_DEG, limits)
     is_late = tai_s - watch.begun_tai_s > PATIENCE_S + drive_s(watch.way_deg, limits)
     if not (is_standing or is_late) or watch.problem:
         return watch, is_standing
     turn = "" if is_one_turn(limits) else f", {half_text(az_deg, limits)}"
     problem = f"azimuth late: at {az_deg:.1f} deg{turn}, its goal at {goal_deg:.1f} deg"
-    return changed(watch, problem=problem), is_standing
+    return replace(watch, problem=problem), is_standing
 
 
 def half_text(az_deg: float, limits: AxisLimits) -> str:
@@ -217,30 +217,30 @@ def drive_s(way_deg: float, limits: AxisLimits) -> float:
 
 def stopping(watch: TurnWatch, problem: str) -> TurnWatch:
     """The turn is doubted: the antenna is stopped."""
-    return changed(at_rest(watch), phase=Phase.STOPPING, move_to_deg=None, is_sure=False, problem=problem)
+    return replace(at_rest(watch), phase=Phase.STOPPING, move_to_deg=None, is_sure=False, problem=problem)
 
 
 def under_way(watch: TurnWatch, tai_s: float) -> TurnWatch:
     """Note when the antenna was seen first in a mode that stops it, or moves it."""
-    return changed(watch, begun_tai_s=min(watch.begun_tai_s, tai_s))
+    return replace(watch, begun_tai_s=min(watch.begun_tai_s, tai_s))
 
 
 def moving(watch: TurnWatch, to_deg: float) -> TurnWatch:
     """The antenna is moved by a few degrees on the other turn."""
-    return changed(watch, phase=Phase.MOVING, move_to_deg=to_deg, begun_tai_s=inf)
+    return replace(watch, phase=Phase.MOVING, move_to_deg=to_deg, begun_tai_s=inf)
 
 
 def settled(watch: TurnWatch, learned_count: int = 0) -> TurnWatch:
     """The turn is believed again.  learned_count: turns learned by this."""
     count = watch.learned_count + learned_count
-    return changed(at_rest(watch), phase=Phase.BELIEVED, move_to_deg=None, learned_count=count)
+    return replace(at_rest(watch), phase=Phase.BELIEVED, move_to_deg=None, learned_count=count)
 
 
 def corrected(watch: TurnWatch) -> TurnWatch:
     """The turn was another one, as a reading shows."""
-    return changed(at_rest(watch), learned_count=watch.learned_count + 1)
+    return replace(at_rest(watch), learned_count=watch.learned_count + 1)
 
 
 def at_rest(watch: TurnWatch) -> TurnWatch:
     """Forget the way to the goal: it begins anew."""
-    return changed(watch, goal_deg=None, way_deg=0.0, begun_tai_s=inf, side=0, mark_tai_s=inf, problem="")
+    return replace(watch, goal_deg=None, way_deg=0.0, begun_tai_s=inf, side=0, mark_tai_s=inf, problem="")

@@ -13,9 +13,9 @@ axis watch does so, and beside the zenith, where a register's whole lead is litt
 without a motion (`STANDS`).
 """
 
+from dataclasses import replace
 from math import inf
 
-from acu_daemon.control.changed import changed
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.intake import RATE_READINGS, shift_places
 from acu_daemon.control.orders import Event
@@ -92,7 +92,7 @@ def doubt(state: ControlState, config: ControlConfig, events: list[Event], why: 
     }
     events.append(Event("turn.doubted", fields, is_warning=True))
     problem = f"turn doubted: azimuth {az_deg:.1f} deg as believed, or {other_deg:.1f}" if other_deg else why
-    state = changed(state, turn=stopping(state.turn, problem))
+    state = replace(state, turn=stopping(state.turn, problem))
     return owe_stop(release(forget_in_force(forget_motion(state))))
 
 
@@ -130,7 +130,7 @@ def _on_its_way(
     turn, is_pulled_for_good = watch_pull(
         turn, tai_s, az_deg, _rate_deg_s(state), limits, scale=scale, is_pulled=is_pulled
     )
-    state = state if turn is state.turn else changed(state, turn=turn)
+    state = state if turn is state.turn else replace(state, turn=turn)
     if is_pulled_for_good:
         why = "the azimuth moves away from its command, as it would on the other turn"
         return doubt(state, config, events, why), ""
@@ -170,7 +170,7 @@ def _stopped(state: ControlState, status: Status, config: ControlConfig, events:
     if state.arming.is_stop_due or duty_of(status) is not Duty.STAND:
         return state
     last_tai_s, limits = state.intake.track_of_readings[-1][0], config.azimuth
-    state = changed(state, turn=under_way(state.turn, last_tai_s))
+    state = replace(state, turn=under_way(state.turn, last_tai_s))
     az_deg = [az for _, az, _ in state.intake.track_of_readings]
     moved_deg = max(az_deg) - min(az_deg)
     braking_s = BRAKING_MARGIN * limits.max_rate_deg_s / limits.max_acceleration_deg_s2
@@ -188,7 +188,7 @@ def _stopped(state: ControlState, status: Status, config: ControlConfig, events:
         Event("turn.tried", {"az_deg": other_deg, "believed_deg": state.intake.az_deg, "move_to_deg": move_to_deg})
     )
     state = anew(on_other_turn(state, other_deg - state.intake.az_deg))
-    return changed(state, turn=moving(state.turn, move_to_deg))
+    return replace(state, turn=moving(state.turn, move_to_deg))
 
 
 def _moved(state: ControlState, status: Status, config: ControlConfig, events: list[Event]) -> tuple[ControlState, str]:
@@ -198,7 +198,7 @@ def _moved(state: ControlState, status: Status, config: ControlConfig, events: l
     has_followed = is_led and to_deg is not None and abs(az_deg - to_deg) < ARRIVED_DEG
     if not has_followed and not is_acquired(status):
         tai_s = state.intake.track_of_readings[-1][0]
-        state = changed(state, turn=under_way(state.turn, tai_s)) if is_led else state
+        state = replace(state, turn=under_way(state.turn, tai_s)) if is_led else state
         if tai_s - state.turn.begun_tai_s <= PATIENCE_S + drive_s(2.0 * STEP_DEG, limits) or not is_watched(config):
             return state, ""
         believed_deg = other_turn(az_deg, limits)
@@ -209,7 +209,7 @@ def _moved(state: ControlState, status: Status, config: ControlConfig, events: l
 
 
 def _settled(state: ControlState, learned_count: int = 0) -> ControlState:
-    return changed(state, turn=settled(state.turn, learned_count))
+    return replace(state, turn=settled(state.turn, learned_count))
 
 
 def locate_azimuth(
@@ -235,7 +235,7 @@ def locate_azimuth(
         fields = {"az_deg": az_deg, "believed_deg": az_deg - shift_deg, "sector_bit": int(status.is_sector_high)}
         events.append(Event("turn.corrected", fields, is_warning=True))
         new = corrected(new)
-    return state if new is turn else changed(state, turn=new), az_deg
+    return state if new is turn else replace(state, turn=new), az_deg
 
 
 def on_other_turn(state: ControlState, shift_deg: float) -> ControlState:

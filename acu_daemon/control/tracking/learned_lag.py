@@ -3,7 +3,8 @@
 control.tracking.lag has the theory.
 """
 
-from acu_daemon.control.changed import changed
+from dataclasses import replace
+
 from acu_daemon.control.state import ControlState, Lag
 from acu_daemon.protocol.angles import LSB_DEG
 
@@ -28,12 +29,12 @@ def learn_lag(state: ControlState, az_deg: float, el_deg: float) -> ControlState
         az=state.lag.az.seen(in_force.az_deg - before.az_deg, in_force.az_deg - az_deg),
         el=state.lag.el.seen(in_force.el_deg - before.el_deg, in_force.el_deg - el_deg),
     )
-    return changed(state, lag=lag)
+    return replace(state, lag=lag)
 
 
 def forget_lag(state: ControlState) -> ControlState:
     """Of an axis that failed nothing is kept."""
-    return changed(state, lag=Lag())
+    return replace(state, lag=Lag())
 
 
 def _is_steady(before_deg: float, in_force_deg: float, newest_deg: float) -> bool:

@@ -7,7 +7,6 @@ Owner of `Signal`.
 from dataclasses import replace
 from math import isfinite
 
-from acu_daemon.control.changed import changed
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.orders import Event
 from acu_daemon.control.state import ControlState, PathOffset, Signal
@@ -26,7 +25,7 @@ def drop_unusable_offset(state: ControlState, refused: str) -> tuple[ControlStat
     offset = state.signal.offset
     if offset is None or isfinite(offset.along_s + offset.across_deg):
         return state, refused
-    return changed(state, signal=changed(state.signal, offset=None)), "offset"
+    return replace(state, signal=replace(state.signal, offset=None)), "offset"
 
 
 def forget_other_pass(state: ControlState, sky: Sky) -> ControlState:
@@ -36,12 +35,12 @@ def forget_other_pass(state: ControlState, sky: Sky) -> ControlState:
         return state
     if signal.pass_rise_tai_s is not None:
         state, signal = forget_search(state), Signal(is_offset_refused=signal.is_offset_refused)
-    return changed(state, signal=changed(signal, pass_rise_tai_s=sky.plan.rise_tai_s))
+    return replace(state, signal=replace(signal, pass_rise_tai_s=sky.plan.rise_tai_s))
 
 
 def resume_pass(state: ControlState) -> ControlState:
     """The pass was acquired before the daemon was started again."""
-    return changed(state, signal=changed(state.signal, has_acquired=True))
+    return replace(state, signal=replace(state.signal, has_acquired=True))
 
 
 def learn_of_signal(
@@ -54,13 +53,15 @@ def learn_of_signal(
     if not is_acquired(seen.status) or track not in AUTOTRACKING:
         if signal.acquired_since_tai_s is None:
             return state
-        return changed(state, signal=changed(signal, acquired_since_tai_s=None))
+        return replace(state, signal=replace(signal, acquired_since_tai_s=None))
     since_tai_s = signal.acquired_since_tai_s or tai_s
     has_locked = signal.has_locked or tai_s - since_tai_s >= config.lock_dwell_s
-    new = replace(signal, acquired_since_tai_s=since_tai_s, has_acquired=True, has_locked=has_locked)
+    new = signal
+    if signal.acquired_since_tai_s is None or not signal.has_acquired or has_locked is not signal.has_locked:
+        new = replace(signal, acquired_since_tai_s=since_tai_s, has_acquired=True, has_locked=has_locked)
     if track is TrackState.AUTOTRACK_TLE and seen.is_in_step:
         new = _learn_offset(new, seen.reading, sky, config, events)
-    return changed(state, signal=new)
+    return state if new is signal else replace(state, signal=new)
 
 
 def _learn_offset(signal: Signal, reading: Reading, sky: Sky, config: ControlConfig, events: list[Event]) -> Signal:
@@ -79,11 +80,11 @@ def _learn_offset(signal: Signal, reading: Reading, sky: Sky, config: ControlCon
                 "most_across_deg": round(most_across_deg, 2),
             }
             events.append(Event("offset.refused", fields, is_warning=True))
-        return changed(signal, is_offset_refused=True)
+        return replace(signal, is_offset_refused=True)
     old = signal.offset
     if old is not None and old.model is prediction.model:
         new = old.along_s + GAIN * (new[0] - old.along_s), old.across_deg + GAIN * (new[1] - old.across_deg)
-    return changed(signal, offset=PathOffset(*new, prediction.model), is_offset_refused=False)
+    return replace(signal, offset=PathOffset(*new, prediction.model), is_offset_refused=False)
 
 
 def learned_point(state: ControlState, sky: Sky, tai_s: float, *, follow: bool) -> Pointing | None:

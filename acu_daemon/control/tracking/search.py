@@ -5,7 +5,6 @@ Owner of `Search`.
 
 from dataclasses import replace
 
-from acu_daemon.control.changed import changed
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.orders import Event
 from acu_daemon.control.state import ControlState, Scan, Search
@@ -44,7 +43,7 @@ def search(
     if not is_searching or sky.prediction is None or reading is None:
         return state
     if not was_searching:
-        state = changed(state, search=Search(replace(state.search.scan, is_aimed=False), reading.tai_s))
+        state = replace(state, search=Search(replace(state.search.scan, is_aimed=False), reading.tai_s))
         events.append(_begins(state.search.scan, sky.prediction, now_tai_s, config))
     dt_s = reading.tai_s - state.search.scanned_tai_s
     if was_searching and (dt_s == 0.0 or not seen.is_in_step):
@@ -53,12 +52,12 @@ def search(
     if scan.round_count > state.search.scan.round_count:
         fields = {"covered": covered_text(state.search.scan, sky.prediction, config), "action": "begun again"}
         events.append(Event("search.covered", fields, is_warning=True))
-    return changed(state, search=Search(scan, reading.tai_s))
+    return replace(state, search=Search(scan, reading.tai_s))
 
 
 def forget_search(state: ControlState) -> ControlState:
     """The next search begins at the path."""
-    return changed(state, search=changed(state.search, scan=Scan()))
+    return replace(state, search=replace(state.search, scan=Scan()))
 
 
 def _begins(scan: Scan, prediction: Prediction, now_tai_s: float, config: ControlConfig) -> Event:

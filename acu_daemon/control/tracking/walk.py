@@ -3,7 +3,8 @@
 Owner of `Tracking`.  Pure.  control.tracking.state_table is the table, control.tracking.causes finds what drives it.
 """
 
-from acu_daemon.control.changed import changed
+from dataclasses import replace
+
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.extra_exchange import forget_asked
 from acu_daemon.control.intake import doubt_place
@@ -27,10 +28,10 @@ def walk(
     causes = find_causes(state, sky, seen.silence_s, now_tai_s, config)
     tracking = state.tracking
     if tracking.track in HOLDING and _is_sure(sky, now_tai_s, config):
-        tracking = changed(tracking, hold_from_tai_s=now_tai_s)
+        tracking = replace(tracking, hold_from_tai_s=now_tai_s)
     step = transition(tracking.track, causes)
     if step is None:
-        return state if tracking is state.tracking else changed(state, tracking=tracking)
+        return state if tracking is state.tracking else replace(state, tracking=tracking)
     before, (track, cause) = tracking.track, step
     fields = {"state": str(track), "before": str(before), "cause": str(cause)}
     events.append(Event("state.changed", fields, is_warning=track in ALARMS))
@@ -38,8 +39,8 @@ def walk(
         events += lateness(state, sky, now_tai_s, config)
     begins_hold = track in HOLDING and before not in HOLDING
     hold_from_tai_s = now_tai_s if begins_hold else tracking.hold_from_tai_s
-    tracking = changed(tracking, track=track, entered_tai_s=now_tai_s, hold_from_tai_s=hold_from_tai_s)
-    state = changed(state, tracking=tracking)
+    tracking = replace(tracking, track=track, entered_tai_s=now_tai_s, hold_from_tai_s=hold_from_tai_s)
+    state = replace(state, tracking=tracking)
     if track is TrackState.LINK_LOST:
         state = doubt_place(forget_motion(forget_writes(forget_asked(begin_after_lost_link(state)))))
     return state
