@@ -52,7 +52,7 @@ OUTSIDE = {
     "an issue by its number": re.compile(r"\b[Ii]ssues? #?\d+\b"),
 }
 # Being moved: they cite the same outside things, and are converted where they come to rest.
-NOT_YET = ("acu_daemon/control/", "acu_daemon/assist/", "acu_daemon/config")
+NOT_YET = ("acu_daemon/control/",)
 
 
 def is_converted(path: Path) -> bool:

@@ -10,7 +10,7 @@ from real_passes import noisy
 from acu_daemon.assist.estimators.estimator import EstimatorSettings, make_estimator
 from acu_daemon.assist.estimators.kalman import Estimate, KalmanEstimator, initial_estimate, linearise, update
 from acu_daemon.assist.reading_gate import OUTLIER
-from acu_daemon.assist.settings import DAEMON, SEED, KalmanTuning
+from acu_daemon.assist.settings import DAEMON, PAPER, KalmanTuning
 from acu_daemon.model import Correction, Readings
 from acu_daemon.orbit.look import look_at
 from acu_daemon.units import DEG
@@ -144,7 +144,7 @@ def _same_estimate(a, b):
     assert np.allclose(a.state.estimate[:2], b.state.estimate[:2], atol=BATCHING_DEG * DEG, rtol=0.0)
 
 
-@pytest.mark.parametrize("tuning", [SEED, DAEMON])
+@pytest.mark.parametrize("tuning", [PAPER, DAEMON])
 def test_a_single_wild_reading_is_left_out_and_moves_nothing(tuning):
     source, where = circular(), site(4.0)
     readings = _part(_readings(source, where), 0, 1000)
@@ -173,11 +173,11 @@ def test_the_seeds_floor_keeps_the_covariance_open():
     """Kuga and Carrara 1988, 5.3: noise of (0.01 deg)^2 a second enters while a sigma is below 0.05 deg."""
     source, where = circular(), site(4.0)
     readings = _readings(source, where, step_s=1.0)
-    seed, static = _kalman(source, where, SEED), _kalman(source, where, STATIC)
+    seed, static = _kalman(source, where, PAPER), _kalman(source, where, STATIC)
     for kalman in (seed, static):
         kalman.add(readings)
     assert seed.state.estimate.p_mm > 30 * static.state.estimate.p_mm
-    assert initial_estimate(SEED).p_rr == pytest.approx((1.0 * DEG) ** 2)
+    assert initial_estimate(PAPER).p_rr == pytest.approx((1.0 * DEG) ** 2)
 
 
 def test_process_noise_counts_seconds_and_not_readings():

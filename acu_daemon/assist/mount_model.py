@@ -1,4 +1,4 @@
-"""Directions in the encoder frame as a fit has them: orbit, station's place, angle biases, air and mount.  Pure.
+"""The mount model of a fit: encoder angles from orbit, station's place, angle biases, air and mount.  Pure.
 
 Commands go through the same encoders as readings, so biases that a fit found belong into the commands.  Estimators see
 readings without air and mount (`geometric`), and their biases are what is left there; so a predicted direction gets the

@@ -8,7 +8,7 @@ from acu_daemon.model import AxisLimits
 
 @dataclass(frozen=True, slots=True)
 class KalmanTuning:
-    """Initial covariance and process noise of the Kalman filter (seed 002, 5.3), 1 sigma, degrees.
+    """Initial covariance and process noise of the Kalman filter (Kuga and Carrara 1988, 5.3), 1 sigma, degrees.
 
     The walks are per square root of a second of data.  Process noise is added to a state only while its sigma is below
     the floor.
@@ -21,7 +21,7 @@ class KalmanTuning:
     floor_deg: float = inf
 
 
-SEED = KalmanTuning(1.0, 2.0, 0.01, 0.01, 0.05)  # seed 002, 5.3, with its 1 Hz readings
+PAPER = KalmanTuning(1.0, 2.0, 0.01, 0.01, 0.05)  # Kuga and Carrara 1988, 5.3: readings at 1 Hz
 DAEMON = KalmanTuning(0.2, 2.0, 5e-5, 2e-4)  # measured over a population of orbits: docs/decisions
 
 
@@ -74,7 +74,7 @@ class EstimatorSettings:
 
     Noise is 1 sigma, across the elevation (azimuth x cos(el)) and in elevation; `full` adds the cot term x cot(el) to
     the elevation's.  Without axis limits no reading counts as too fast.  inversion_count: consecutive inversions that
-    `circular` averages, 3 to 8 (seed 001, 2.6c).
+    `circular` averages, 3 to 8 (Aguirre and Medeiros 1988, 2.6c).
 
     For `full`: the biases' sigmas (model.AngleBias), the orbit's (None: from the kind of elements and their age) and
     the station's, east and north each, metres.

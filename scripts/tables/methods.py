@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from acu_daemon.assist.settings import SEED, EstimatorSettings, StateSigmas
+from acu_daemon.assist.settings import PAPER, EstimatorSettings, StateSigmas
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import Array
 from tables.errors_put_in import taken_as_mean, turned_to_mean
@@ -19,7 +19,7 @@ class Method:
 
 
 # Kuga and Carrara 1988, 5.3; every reading is used, as the papers have no gate.
-_AS_PUBLISHED = EstimatorSettings(0.1, 0.1, max_fit_elevation_deg=90.0, beamwidth_deg=20.0, kalman=SEED)
+_AS_PUBLISHED = EstimatorSettings(0.1, 0.1, max_fit_elevation_deg=90.0, beamwidth_deg=20.0, kalman=PAPER)
 # What an operator knows: the noise, how good the elements are (5.3) and that the station is rounded.
 _TODAY_PLAIN = EstimatorSettings(
     0.06,

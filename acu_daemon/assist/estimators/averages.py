@@ -1,8 +1,10 @@
-"""The estimators that average inversions: `circular` (seed 001) and `deterministic` (seed 000).  Pure.
+"""The estimators that average inversions: `circular` and `deterministic`.  Pure.
+
+Equations: docs/estimation.md, The papers' averages.
 
 Both correct any source.  At each reading the source's osculating a, e, i and argument of perigee are taken as known,
 the reading is inverted with them, and what is averaged is the difference of raan and mean anomaly to the source's own.
-For a source that moves by secular rates only, that is the seed's propagation of the mean to the next reading (eqs 18,
+For a source that moves by secular rates only, that is the paper's propagation of the mean to the next reading (eqs 18,
 20, 21).
 """
 
@@ -40,7 +42,7 @@ def _wrap_pi(angle_rad: Array) -> Array:
 
 
 class DeterministicEstimator(BaseEstimator):
-    """Seed 000: each reading inverted to raan and mean anomaly (eqs 1-16), their running mean (eqs 17-19)."""
+    """Each reading inverted to raan and mean anomaly, and their running mean: Kuga and Carrara 1990, eqs 1-19."""
 
     name = "deterministic"
 
@@ -83,7 +85,7 @@ class DeterministicEstimator(BaseEstimator):
 
 
 class CircularEstimator(DeterministicEstimator):
-    """Seed 001, 2.3 and 2.6c: circular orbit, the mean of the last 3 to 8 consecutive inversions.
+    """Aguirre and Medeiros 1988, 2.3 and 2.6c: circular orbit, the mean of the last 3 to 8 consecutive inversions.
 
     The sphere of step 1 has the radius at which the source has the satellite: for a circular source its a.  Mean
     anomaly is the argument of latitude.  The branch nearest to the mean of all inversions is taken: near the highest

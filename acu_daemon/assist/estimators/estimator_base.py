@@ -1,4 +1,4 @@
-"""What all estimators share: the gate, the count of readings, and the figures of a fit.  Pure."""
+"""What all estimators share: the reading gate, the count of readings, and the figures of a fit.  Pure."""
 
 from abc import ABC, abstractmethod
 from dataclasses import replace
@@ -124,7 +124,7 @@ def for_people(propagator: Propagator, correction: Correction, tai_s: float, sit
 
 
 def mean_motion_rad_s(r_m: Array, v_m_s: Array) -> Array:
-    """Keplerian mean motion of inertial states (N, 3), (N,).  Seed 002, eq 4.12; a from the vis-viva law."""
+    """Keplerian mean motion of inertial states (N, 3), (N,).  a: from vis-viva; Kuga and Carrara 1988, eq 4.12."""
     a_m = 1.0 / (2.0 / np.linalg.norm(r_m, axis=1) - np.sum(v_m_s**2, axis=1) / MU_M3_S2)
     n: Array = np.sqrt(MU_M3_S2 / a_m**3)
     return n

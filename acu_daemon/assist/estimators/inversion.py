@@ -1,6 +1,7 @@
 """From an azimuth and an elevation to the node and the mean anomaly, the other elements known.  Pure.
 
-Seed 000, eqs 1-16 (seed 002, section 3).  Two corrections to the print: the denominator of eq 8 is x_e + rho c_x, and
+Kuga and Carrara 1990, eqs 1-16 (docs/estimation.md, The inversion).
+Two corrections to the print: the denominator of eq 8 is x_e + rho c_x, and
 the argument of eq 11 beyond [-1, 1] is refused with a reason (docs/decisions).
 """
 
@@ -42,7 +43,7 @@ class Inversion:
 
 
 def direction_cosines(az_deg: Array, el_deg: Array, station: Station) -> Array:
-    """Turn azimuth (from north) and elevation into Earth-fixed unit vectors (N, 3).  Seed 000, eqs 2 and 3."""
+    """Turn azimuth (from north) and elevation into Earth-fixed unit vectors (N, 3), eqs 2 and 3."""
     az, el = np.radians(az_deg), np.radians(el_deg)
     enu = np.stack((np.sin(az) * np.cos(el), np.cos(az) * np.cos(el), np.sin(el)), axis=1)
     cosines: Array = enu @ enu_from_itrs(station)
@@ -61,7 +62,7 @@ def invert(
 
     cosines (N, 3) from `direction_cosines`; station_m (3,) Earth-fixed; sidereal_rad (N,) Greenwich sidereal angle;
     radius_m (N,) first guess of the geocentric distance; prior_raan_rad (N,) chooses the ascending or the descending
-    branch: the nearer one (seed 002, section 3).  Iterates the radius (eq 16) until it stands still.
+    branch: the nearer one (Kuga and Carrara 1988, section 3).  Iterates the radius (eq 16) until it stands still.
     """
     radius = np.array(np.broadcast_to(radius_m, cosines.shape[:1]), dtype=float)
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -1,4 +1,6 @@
-"""The Kalman filter of seed 002, section 4: state = what to add to raan and mean anomaly of the source.  Pure.
+"""The Kalman filter of Kuga and Carrara 1988 (docs/estimation.md, The Kalman filter).  Pure.
+
+State: what to add to raan and mean anomaly of the source.
 
 The state is the difference to the source, which moves by its own theory (eqs 4.1, 4.2); so the transition matrix is the
 identity (eq 4.4 as printed divides by the state: docs/decisions).  Readings are taken one scalar at a time, azimuth
@@ -48,7 +50,7 @@ class FilterState:
 
 
 def initial_estimate(tuning: KalmanTuning) -> Estimate:
-    """Give the estimate before the first reading: no correction, diagonal covariance (seed 002, 5.3)."""
+    """Give the estimate before the first reading: no correction, diagonal covariance (Kuga and Carrara 1988, 5.3)."""
     return Estimate(0.0, 0.0, (tuning.sigma_raan_deg * DEG) ** 2, 0.0, (tuning.sigma_mean_anomaly_deg * DEG) ** 2)
 
 
@@ -66,7 +68,7 @@ class Linearised:
 
 
 def linearise(source: Propagator, delta_raan: float, delta_mean_anomaly: float, tai_s: Array, site: Site) -> Linearised:
-    """Evaluate h(x) and H(x), eqs 4.7-4.12, in east-north-up in place of the seed's south-east-up.
+    """Evaluate h(x) and H(x), eqs 4.7-4.12, in east-north-up in place of the paper's south-east-up.
 
     The rotation of eq 4.10 is printed for the opposite direction (docs/decisions); here it is `itrs_from_teme` and
     `enu_from_itrs`, for positions and partials alike.
@@ -92,7 +94,7 @@ def linearise(source: Propagator, delta_raan: float, delta_mean_anomaly: float, 
 
 
 class KalmanEstimator(BaseEstimator):
-    """Seed 002, eqs 4.1-4.15, behind the `Estimator` protocol."""
+    """Kuga and Carrara 1988, eqs 4.1-4.15, behind the `Estimator` protocol."""
 
     name = "kalman"
 

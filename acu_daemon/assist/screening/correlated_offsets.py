@@ -1,7 +1,7 @@
-"""Whether readings wander about their path: an axis that hunts, or a track that is drawn off it slowly.  Pure.
+"""Offsets that are correlated in time: an axis that hunts, or a track that is drawn off its path slowly.  Pure.
 
-White noise of any size averages out; what comes back after a few readings does not, and an orbit cannot follow it.  So
-the measure is the mean product of offsets a few readings apart, against that of the readings believed.
+White noise averages out; correlated offsets do not, and no orbit can follow them.  The measure is the autocovariance of
+the offsets at lags of a few readings, against that of the readings believed.
 """
 
 from collections.abc import Callable
@@ -37,8 +37,8 @@ class CorrelatedOffsets:
     reason: of the newest readings, "" while they do not wander.  begin_tai_s: since when the newest ones do.
     """
 
-    def __init__(self, judge: OrbitTest, settings: EstimatorSettings) -> None:
-        self._judge, self._settings = judge, settings
+    def __init__(self, orbit_test: OrbitTest, settings: EstimatorSettings) -> None:
+        self._orbit_test, self._settings = orbit_test, settings
         self._recent = _NONE
         self._since_tai_s: float | None = None
         self.reason = ""
@@ -82,7 +82,7 @@ class CorrelatedOffsets:
         before = kept.part((kept.tai_s < window.tai_s[0]) & (kept.tai_s > window.tai_s[0] - BEFORE_S))
         if len(before) < WINDOW_COUNT:
             return ""
-        together = self._judge.best_offsets(Readings.joined([before, window]), 1.0)
+        together = self._orbit_test.best_offsets(Readings.joined([before, window]), 1.0)
         if together is None:
             return ""
         old, new = together.part(slice(None, len(before))), together.part(slice(len(before), None))

@@ -1,4 +1,4 @@
-"""Why readings that are off the path are off it: a side lobe, another satellite, or nobody knows.  Pure."""
+"""Why readings are off the path: a side lobe, another satellite, or unknown (docs/estimation.md, Screening).  Pure."""
 
 from math import hypot
 

@@ -1,4 +1,4 @@
-"""Whether readings can be the satellite's: the orbit that fits them must be one that the elements allow.  Pure.
+"""Tests whether readings are the satellite's: their best orbit must be one that the elements allow.  Pure.
 
 Another satellite moves at other rates, so no small change of our elements goes through its readings for long; elements
 that are wrong along the track by degrees are still ours.

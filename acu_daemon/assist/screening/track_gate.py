@@ -1,5 +1,7 @@
 """The gate of readings that knows the orbit: side lobe, wrong target, an axis that accelerates.  Pure.
 
+Theory: docs/estimation.md, Screening.
+
 A reading near the path of the fit is kept.  Readings off it wait: they are kept after all if an orbit near the elements
 goes through them and the readings kept before (the path was extrapolated badly), and they take the place of those kept
 before once they alone have obeyed such an orbit for long enough (what was believed first was wrong).  Before anything
@@ -65,8 +67,8 @@ class TrackGate:
             settings.azimuth,
             settings.elevation,
         )
-        self._judge = OrbitTest(source, site, settings)
-        self._wander = CorrelatedOffsets(self._judge, settings)
+        self._orbit_test = OrbitTest(source, site, settings)
+        self._correlated = CorrelatedOffsets(self._orbit_test, settings)
         self._kept: list[Readings] = []
         self._waiting = _NONE
         self._waiting_reason = ""
@@ -114,10 +116,10 @@ class TrackGate:
                 taken = self._first(good.part(is_low))
             else:
                 is_strong = is_low & ~is_weak_beside(seen, good, self.kept, self._settings.beamwidth_deg)
-                is_asked = is_strong & self._wander.is_within(seen)
-                if self._wanders(good.part(is_asked), fit):
-                    reasons[self._wander.reason] += self._leave_out(good.part(is_asked), self._wander.reason)
-                    taken = self._leave_wanderers(good.part(is_low & ~is_asked), fit)
+                is_asked = is_strong & self._correlated.is_within(seen)
+                if self._is_correlated(good.part(is_asked), fit):
+                    reasons[self._correlated.reason] += self._leave_out(good.part(is_asked), self._correlated.reason)
+                    taken = self._leave_correlated(good.part(is_low & ~is_asked), fit)
                 else:
                     is_near = is_strong & seen.is_near
                     taken = self._follow(good.part(is_near), good.part(is_low & ~is_near), fit)
@@ -161,7 +163,7 @@ class TrackGate:
             trials.append((max(WIDE_AFTER_S, self._trial_s), WIDE))
         for trial_s, factor in trials:
             tail = tail_of(self._waiting, trial_s or WAITING_S)
-            if span_s(self._waiting) >= trial_s and (seen := self._judge.verdict(None, tail, factor)) is not None:
+            if span_s(self._waiting) >= trial_s and (seen := self._orbit_test.verdict(None, tail, factor)) is not None:
                 self._waiting_reason = WRONG_TARGET
                 return self._believe(tail, seen)
         self._trial_s = max(self._trial_s, FIRST_TRIAL_S)
@@ -191,22 +193,22 @@ class TrackGate:
         elif off_s >= CLEAR_S:
             is_rebuilt = self._give_back(fit)
         tail = tail_of(self._waiting, TAIL_S)
-        if (judged := self._judge.verdict(tail_of(self.kept, JUDGED_S), tail, NARROW)) is not None:
+        if (judged := self._orbit_test.verdict(tail_of(self.kept, JUDGED_S), tail, NARROW)) is not None:
             return self._believe(tail, judged)
         return Taken(near, is_rebuilt or self._resets())
 
-    def _wanders(self, asked: Readings, fit: FitResult) -> bool:
+    def _is_correlated(self, asked: Readings, fit: FitResult) -> bool:
         """Whether the readings, with those before them, wander about the path; a fit to few cannot tell."""
         if len(asked) == 0:
             return False
-        self._wander.take(asked)
+        self._correlated.take(asked)
         path = replace(fit, covariance=None)  # its sigma is of no use here, and slow
-        return seconds(self.kept) >= YOUNG_S and self._wander.denies(self.kept, partial(self._offsets, fit=path))
+        return seconds(self.kept) >= YOUNG_S and self._correlated.denies(self.kept, partial(self._offsets, fit=path))
 
-    def _leave_wanderers(self, off: Readings, fit: FitResult) -> Taken:
+    def _leave_correlated(self, off: Readings, fit: FitResult) -> Taken:
         """Leave out what was kept of the window that wanders; go on with the readings farther off."""
-        is_theirs = self.kept.tai_s >= self._wander.begin_tai_s
-        has_some = self._leave_out(self.kept.part(is_theirs), self._wander.reason) > 0
+        is_theirs = self.kept.tai_s >= self._correlated.begin_tai_s
+        has_some = self._leave_out(self.kept.part(is_theirs), self._correlated.reason) > 0
         self._kept = [self.kept.part(~is_theirs)]
         taken = self._follow(_NONE, off, fit)
         return replace(taken, is_rebuilt=taken.is_rebuilt or has_some)
@@ -260,7 +262,7 @@ class TrackGate:
         if span_s(self._waiting) < needed_s:
             return False
         tail = tail_of(self._waiting, needed_s)
-        judged = self._judge.verdict(None, tail, NARROW)
+        judged = self._orbit_test.verdict(None, tail, NARROW)
         if judged is None:
             return False
         self._leave_out(self.kept, BELIED)
@@ -271,5 +273,5 @@ class TrackGate:
 
     def _are_kept_strained(self) -> bool:
         """Whether the orbit through the kept readings is much less likely than the one through those that wait."""
-        of_kept, of_waiting = (self._judge.strain(tail_of(one, STRAIN_S)) for one in (self.kept, self._waiting))
+        of_kept, of_waiting = (self._orbit_test.strain(tail_of(one, STRAIN_S)) for one in (self.kept, self._waiting))
         return of_kept - STRAIN > of_waiting

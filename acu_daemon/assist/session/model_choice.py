@@ -1,7 +1,7 @@
 """Which model the prediction is made from: the elements alone, the last pass's fit, or the new one.  Pure.
 
-The newest locked residuals decide; a new fit that is bad three times in a row starts afresh (the practice of the
-GD 7200, reference/field.md).
+The newest locked residuals decide; a new fit that is bad three times in a row starts afresh: docs/estimation.md, Model
+choice.
 """
 
 from dataclasses import dataclass

@@ -43,7 +43,7 @@ def predict(
     fit: what corrected the propagator; its biases and its place of the station are in the prediction, and its
     covariance gives sigma_deg.
     Raises:  OrbitError: the propagator has no answer for one of the times.
-    Source:  seed 000, section 4; 90 s at 10 Hz: seed 001, section 2.5.
+    Source:  Kuga and Carrara 1990, section 4; 90 s at 10 Hz: Aguirre and Medeiros 1988, section 2.5.
     """
     before = round(lead_in_s / step_s)
     tai_s = start_tai_s + step_s * np.arange(-before, round(horizon_s / step_s) + 1, dtype=np.float64)

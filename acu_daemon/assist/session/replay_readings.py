@@ -1,4 +1,4 @@
-"""Recorded readings through the same fit and prediction as the daemon's.  Pure."""
+"""Replays recorded readings through the fit and the prediction of the daemon.  Pure."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field

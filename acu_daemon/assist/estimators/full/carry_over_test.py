@@ -1,4 +1,7 @@
-"""Whether readings deny a carried orbit: their innovations against what it and its covariance allow.  Pure."""
+"""Tests what an earlier pass left: innovations of the readings against its covariance.  Pure.
+
+Theory: docs/estimation.md, Carry-over.
+"""
 
 import numpy as np
 
@@ -17,7 +20,7 @@ LONGEST_GAP_S = 10.0  # a minute with a longer gap between two readings is no mi
 
 
 class CarryOverTest:
-    """Watches the readings of a pass against its prior.  Mutable; one owner."""
+    """Rejects a prior when a minute of readings lies beyond its sigmas.  Mutable; one owner."""
 
     def __init__(self, source: Propagator, site: Site, settings: EstimatorSettings, prior: Prior) -> None:
         self._source = source

@@ -1,5 +1,7 @@
 """The states of the `full` estimator, their order, and what is known of them before any reading.  Pure.
 
+docs/estimation.md, States, and docs/estimation.md, Prior, have the theory.
+
 0-5    corrections of the mean elements at epoch, as in Correction: raan, mean anomaly, mean motion, e cos argp,
        e sin argp, inclination (rad, rad/s for the mean motion)
 6-9    angle biases, as in AngleBias: azimuth, azimuth / cos(el), elevation, elevation x cot(el) (rad)

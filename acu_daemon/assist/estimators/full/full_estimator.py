@@ -43,8 +43,8 @@ class FullEstimator(BaseEstimator):
         """
         super().__init__(propagator, site, settings)
         self._carried = carried
-        self._denial: CarryOverTest | None = None
-        self._problem: Batch | None = None
+        self._carry_over_test: CarryOverTest | None = None
+        self._batch: Batch | None = None
         self._parts: list[Sights] = []
         self._solution: Solution | None = None
         self._is_new = False
@@ -59,10 +59,10 @@ class FullEstimator(BaseEstimator):
 
     def _use(self, readings: Readings) -> list[str | None]:
         seen = sights(readings)
-        if self._problem is None:
+        if self._batch is None:
             self._start(float(readings.tai_s[0]))
-        if self._denial is not None and self._denial.sees(seen):
-            self._carried = self._denial = None
+        if self._carry_over_test is not None and self._carry_over_test.sees(seen):
+            self._carried = self._carry_over_test = None
             self._start(float((self._parts or [seen])[0].tai_s[0]))
             self.notes.append(
                 f"the last pass's orbit is dropped: for {DENIED_S:g} s all readings were more than {WIDEST_SIGMAS:g} "
@@ -75,9 +75,9 @@ class FullEstimator(BaseEstimator):
     def _start(self, first_tai_s: float) -> None:
         """Begin with what is known before the first reading, the one at first_tai_s."""
         self._solution = None
-        self._problem = Batch(self._source, self._site, self._settings, self._prior(first_tai_s))
+        self._batch = Batch(self._source, self._site, self._settings, self._prior(first_tai_s))
         if self._carried is not None:
-            self._denial = CarryOverTest(self._source, self._site, self._settings, self._problem.prior)
+            self._carry_over_test = CarryOverTest(self._source, self._site, self._settings, self._batch.prior)
 
     def _prior(self, at_tai_s: float) -> Prior:
         if self._carried is None:
@@ -92,23 +92,23 @@ class FullEstimator(BaseEstimator):
 
         Raises:  OrbitError: the source has no answer for one of the readings' times.
         """
-        if self._problem is not None and self._fit is None:
+        if self._batch is not None and self._fit is None:
             seen = _joined(self._parts)
             self._parts = [seen]
             if self._is_new or self._solution is None:
-                self._solution = self._solve(self._problem, seen)
+                self._solution = self._solve(self._batch, seen)
                 self._is_new = False
             self._fit = self._result(self._solution, float(seen.tai_s[-1]))
         return self._fit
 
-    def _solve(self, problem: Batch, seen: Sights) -> Solution:
-        given = WIDTHS[self._width].of(problem)
+    def _solve(self, batch: Batch, seen: Sights) -> Solution:
+        given = WIDTHS[self._width].of(batch)
         solution = solve(given, seen, self._solution)
         may_widen = self._may_widen and self._carried is None and seen.tai_s.size >= self._next_try_count
         if not may_widen or not is_strained(given, solution):
             return solution
         self._next_try_count = int(_RETRY_SHARE * seen.tai_s.size)
-        solution, width = most_likely(problem, self._width, seen, solution)
+        solution, width = most_likely(batch, self._width, seen, solution)
         if width > self._width:
             self._width = width
             self.notes.append(self._why_far(solution, float(seen.tai_s[-1])))

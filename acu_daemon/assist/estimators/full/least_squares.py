@@ -1,5 +1,7 @@
 """Least squares with a prior and robust weights: the batch behind the `full` estimator.  Pure.
 
+docs/estimation.md, The sweeps, has the equations.
+
 Each sweep takes the residuals of all readings against the path that the present states give, compressed into normal
 points; partials only set the direction of the step.  So the result does not depend on how the readings arrived.
 """
@@ -49,8 +51,8 @@ class Batch:
 class OrbitPartials:
     """Partials of the orbit's states, and how far the path has moved on the sky since.  Mutable; one owner."""
 
-    def __init__(self, problem: Batch, x: Array, node_tai_s: Array) -> None:
-        _, self.curve = orbit_partials_itrs(problem.source, x, problem.site, node_tai_s)
+    def __init__(self, batch: Batch, x: Array, node_tai_s: Array) -> None:
+        _, self.curve = orbit_partials_itrs(batch.source, x, batch.site, node_tai_s)
         self.moved_rad = 0.0
 
 
@@ -64,7 +66,7 @@ class Solution:
     partials: OrbitPartials
 
 
-def solve(problem: Batch, seen: Sights, before: Solution | None) -> Solution:
+def solve(batch: Batch, seen: Sights, before: Solution | None) -> Solution:
     """Find the most likely states.  before: where to start from, such as the solution with fewer readings.
 
     Without it the first minute comes first: at low elevation even elements hundreds of kilometres off are near linear.
@@ -72,11 +74,11 @@ def solve(problem: Batch, seen: Sights, before: Solution | None) -> Solution:
 
     Raises:  OrbitError: the source has no answer for one of the times, or for the states on the way.
     """
-    start = before or _sweep(problem, _first_of(seen), problem.prior.mean, None)
-    warm = _sweep(problem, seen, start.x, start.partials)
+    start = before or _sweep(batch, _first_of(seen), batch.prior.mean, None)
+    warm = _sweep(batch, seen, start.x, start.partials)
     if float(np.mean(warm.left.weights)) > 1.0 - _DOUBTFUL_SHARE:
         return warm
-    cold = _sweep(problem, seen, problem.prior.mean, None)
+    cold = _sweep(batch, seen, batch.prior.mean, None)
     return min(warm, cold, key=lambda one: float(np.sum(one.left.noise_scale)))
 
 
@@ -85,30 +87,30 @@ def _first_of(seen: Sights) -> Sights:
     return Sights(*(getattr(seen, item.name)[:end] for item in fields(seen)))
 
 
-def _sweep(problem: Batch, seen: Sights, x: Array, partials: OrbitPartials | None) -> Solution:
+def _sweep(batch: Batch, seen: Sights, x: Array, partials: OrbitPartials | None) -> Solution:
     nodes = node_times(float(seen.tai_s[0]), float(seen.tai_s[-1]))
     if partials is None or not np.array_equal(partials.curve.node_tai_s, nodes):
-        partials = OrbitPartials(problem, x, nodes)
+        partials = OrbitPartials(batch, x, nodes)
     starts = seconds_of(seen.tai_s)
-    has_shift = bool(problem.prior.covariance[STATION, STATION].any())
+    has_shift = bool(batch.prior.covariance[STATION, STATION].any())
     for _ in range(_MAX_SWEEPS):
-        path, here = path_itrs(problem.source, x, problem.site, nodes), site_of(problem.site, x)
-        left = residuals(path, here, x, problem.settings, seen)
+        path, here = path_itrs(batch.source, x, batch.site, nodes), site_of(batch.site, x)
+        left = residuals(path, here, x, batch.settings, seen)
         points = normal_points(seen.tai_s, left, starts)
         h = sky_partials(path.at(points.tai_s), partials.curve.at(points.tai_s), here, has_shift)
-        new, covariance = _step(problem.prior, x, h, points)
+        new, covariance = _step(batch.prior, x, h, points)
         step_rad = float(np.max(np.abs(np.tensordot(new - x, h, 1)), initial=0.0))
         x = new
         if step_rad < _CONVERGED_RAD:
             break
         partials.moved_rad += step_rad
         if partials.moved_rad > _STALE_RAD:
-            partials = OrbitPartials(problem, x, nodes)
+            partials = OrbitPartials(batch, x, nodes)
     return Solution(x, covariance, left, partials)
 
 
 def _step(prior: Prior, x: Array, h: Array, points: Points) -> tuple[Array, Array]:
-    """Solve the linear problem about x for z, states = mean + root z: the prior is then a unit matrix."""
+    """Solve the linear batch about x for z, states = mean + root z: the prior is then a unit matrix."""
     root = prior.root
     rows = (h * points.per_sigma).reshape(h.shape[0], -1)
     target = (points.off * points.per_sigma).reshape(-1) + (x - prior.mean) @ rows

@@ -1,4 +1,7 @@
-"""Readings against a path: residuals, the noise they show, robust weights, and normal points of one second.  Pure."""
+"""Readings against a path: residuals, the noise they show, robust weights, normal points of one second.  Pure.
+
+Equations: docs/estimation.md, Residuals; docs/estimation.md, Noise and robust weights.
+"""
 
 from dataclasses import dataclass
 
