@@ -35,7 +35,7 @@ from acu_daemon.protocol.messages import (
 from acu_daemon.protocol.sa3842 import CommandEvent, encode_reply
 from acu_daemon.sim.acu_modes import Modes
 from acu_daemon.sim.acu_status import flags_of, status_of
-from acu_daemon.sim.antenna import TILT, Antenna
+from acu_daemon.sim.antenna import TILT, SimulatedAntenna
 from acu_daemon.sim.command_registers import CommandRegisters, turns_within
 from acu_daemon.sim.faults import WATCHDOG_BIT, FaultMemory, FaultNibble
 from acu_daemon.sim.parameters import Parameters
@@ -62,7 +62,7 @@ class FakeAcu:
         self.on_write: Callable[[RegisterWrite], None] | None = None
         self._has_tilt = parts.scenario.acu.has_tilt
         self.is_powered = True
-        self._antenna = Antenna(parts)
+        self._antenna = SimulatedAntenna(parts)
         self._tick = 0
         self._part_s = 0.0
         mode = parts.scenario.acu.mode
@@ -116,7 +116,7 @@ class FakeAcu:
         self._faults.end(nibble, bit)
 
     @property
-    def antenna(self) -> Antenna:
+    def antenna(self) -> SimulatedAntenna:
         """What moves and hears, to break it."""
         return self._antenna
 

@@ -2,11 +2,11 @@
 
 from acu_daemon.protocol.messages import AcuMode, Faults, Status
 from acu_daemon.sim.acu_modes import BACKUP_MODES, Modes
-from acu_daemon.sim.antenna import Antenna
+from acu_daemon.sim.antenna import SimulatedAntenna
 
 
 def status_of(
-    antenna: Antenna, modes: Modes, faults: Faults, *, part_s: float, has_changed: bool, has_tilt: bool
+    antenna: SimulatedAntenna, modes: Modes, faults: Faults, *, part_s: float, has_changed: bool, has_tilt: bool
 ) -> Status:
     """The status block; part_s: since the servo's last tick.  faults: those remembered."""
     az, el, tilt, receiver = antenna.az, antenna.el, antenna.tilt, antenna.receiver
@@ -47,7 +47,7 @@ def status_of(
     )
 
 
-def flags_of(antenna: Antenna, modes: Modes, faults: Faults) -> tuple[object, ...]:
+def flags_of(antenna: SimulatedAntenna, modes: Modes, faults: Faults) -> tuple[object, ...]:
     """Everything whose change sets the CHANGE bit, parameters apart."""
     az, el, tilt, receiver = antenna.az, antenna.el, antenna.tilt, antenna.receiver
     return (

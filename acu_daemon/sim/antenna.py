@@ -60,7 +60,7 @@ class AntennaTrouble:
         return self._beam_deg
 
 
-class Antenna:
+class SimulatedAntenna:
     """Each 50 Hz step: move_and_sense(), then one of halt(), follow(), track(), coast() and stow()."""
 
     def __init__(self, parts: AcuParts) -> None:
