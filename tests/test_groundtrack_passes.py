@@ -134,9 +134,13 @@ def test_passes_of_another_satellite_are_left_out_with_a_word(tmp_path: Path) ->
 
 @pytest.mark.parametrize(
     ("options", "said"),
-    [(("--flux", "20"), "expected sfu, 50 to 400"), (("--flux", "none.csv"), "neither a file nor one of")],
+    [
+        (("--flux", "20"), "expected sfu, 50 to 400"),
+        (("--flux", "none.csv"), "neither a file nor one of"),
+        (("--limit-m", "nan"), "Invalid value for '--limit-m'"),
+    ],
 )
-def test_a_flux_that_is_none_is_refused(tmp_path: Path, options: tuple[str, ...], said: str) -> None:
+def test_a_flux_or_a_limit_that_is_none_is_refused(tmp_path: Path, options: tuple[str, ...], said: str) -> None:
     config = write(tmp_path / "config")
     done = acu_daemon("groundtrack", "from-passes", tmp_path, "--config", config, "--satellite", "scd", *options)
     assert done.code == 2

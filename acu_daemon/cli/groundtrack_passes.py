@@ -53,7 +53,12 @@ def command(
     ] = REAL_BALLISTIC_M2_KG,
     limit_m: Annotated[
         float | None,
-        typer.Option("--limit-m", help="D at which the next manoeuvre comes.  Default: where the last ones were made."),
+        typer.Option(
+            "--limit-m",
+            min=-1e6,
+            max=1e6,
+            help="D at which the next manoeuvre comes.  Default: where the last ones were made.",
+        ),
     ] = None,
     csv: Csv = None,
     plot: Plot = None,

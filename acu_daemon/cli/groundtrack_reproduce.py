@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from acu_daemon.cli.groundtrack_simulate import Dask, Jobs, Tesserals, as_object, with_tesserals
+from acu_daemon.cli.outputs import refuse_unwritable
 from acu_daemon.errors import UsageError
 from acu_daemon.units import DAY_S
 
@@ -152,6 +153,7 @@ def _make_directory(out: Path) -> None:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"--out {out}: {error.strerror}") from None
+    refuse_unwritable(out / "figure-02.png")
 
 
 def _draw(out: Path, labelled: list[tuple[Any, str, Any]], outcomes: list[Any]) -> None:

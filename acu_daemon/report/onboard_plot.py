@@ -12,7 +12,7 @@ from acu_daemon.model import Station
 from acu_daemon.onboard.cone import azimuth_tube, elevation_interval
 from acu_daemon.onboard.ground import footprint_east_north_m, track_east_north_m
 from acu_daemon.onboard.profile import Profile, Task, off_pointing, peak_rate_deg_s
-from acu_daemon.onboard.relief import rate_against_margin
+from acu_daemon.onboard.relief import WIDEST_DEG, rate_against_margin
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.units import Array
 
@@ -153,7 +153,8 @@ def _draw_ground(axes: Axes, task: Task, profile: Profile, station: Station) -> 
 
 
 def _draw_margins(axes: Axes, task: Task, profiles: Mapping[str, Profile]) -> None:
-    axes.plot(MARGINS_DEG, rate_against_margin(task, MARGINS_DEG), color=COLOURS["free"], label="least possible")
+    margins_deg = MARGINS_DEG * min(max(1.0, 1.2 * task.margin_deg / MARGINS_DEG[-1]), WIDEST_DEG / MARGINS_DEG[-1])
+    axes.plot(margins_deg, rate_against_margin(task, margins_deg), color=COLOURS["free"], label="least possible")
     for name, profile in profiles.items():
         axes.plot(
             task.margin_deg, peak_rate_deg_s(profile.azimuth, task.view), "o", color=COLOURS[name], label=LABELS[name]
