@@ -20,6 +20,7 @@ from acu_daemon.control.tracking.register_limiter import limit
 from acu_daemon.control.tracking.scan import DWELL_S, ON_PLACE_BEAMS, go_on, look, pace_s_s, row_deg
 from acu_daemon.control.tracking.state_table import Cause, TrackState
 from acu_daemon.control.tracking.track_frame import beside, offset_of
+from acu_daemon.daemon.motion import Motion
 from acu_daemon.model import AxisLimits, Model, Pointing, Prediction, Reading
 from acu_daemon.pointing.axis import AxisState
 from acu_daemon.protocol.messages import AcuMode, Backup, Status
@@ -307,3 +308,13 @@ def test_an_elevation_that_outruns_its_drive_is_doubted_and_one_that_moves_is_no
         for k in range(CONFIRMED_COUNT):
             doubt.believes(replace(here, el_deg=40.0 + side * k * share * CONFIRMED_DEG), NOW + 0.1 * k)
         assert doubt.known.is_confirmed == is_believed
+
+
+@el_places
+@courses
+def test_an_antenna_is_as_fast_as_it_moves_on_the_sky(el_deg: float, course_deg: float) -> None:
+    path, motion = great_circle(el_deg, course_deg, 0.05), Motion()
+    for k in range(21):
+        at = path.at(NOW + 0.1 * k)
+        motion.add(Reading(NOW + 0.1 * k, at.az_deg % 360.0, at.el_deg, False))
+    assert motion.speed_deg_s(NOW + 2.0) == pytest.approx(0.05, rel=0.05)
