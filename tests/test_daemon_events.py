@@ -201,6 +201,23 @@ def test_a_link_that_is_hung_up_comes_back_at_once_and_autotrack_is_left_alone()
     assert worst_error_deg(flight, T + 10.0, T + 29.9) < HOLD_DEG
 
 
+@pytest.mark.parametrize("losses", [[], [(12.0, 30.0)]], ids=["autotrack", "hold"])
+@pytest.mark.parametrize("at_s", [15.0, 15.02, 15.04, 15.06, 15.08])
+def test_p2_on_another_connection_however_soon_it_came_all_is_read_again_before_anything_is_commanded(
+    at_s: float, losses: list[tuple[float, float]]
+) -> None:
+    """Who answers on it may be another ACU, or the same one after a loss of power."""
+    flight = climb(22.0, losses=losses, script=[(at_s, lambda stage: stage.link.hang_up())])
+    assert seconds_to_state(flight, "LINK-LOST", T + at_s) < 3 * TICK_S
+    after = [
+        command for command in commands_between(flight, T + at_s + 0.005, T + 22.0) if not isinstance(command, Poll)
+    ]
+    if isinstance(after[0], WriteAndPoll):  # in mid-air
+        after = after[1:]
+    assert [type(command) for command in after[:2]] == [Identify, ReadRegisters]
+    assert isinstance(next(command for command in after if isinstance(command, ORDERS)), WriteRegisters)
+
+
 def test_p3_a_long_silence_ends_within_two_seconds_of_its_cause() -> None:
     flight = climb(60.0, script=[(12.0, cut(True)), (45.0, cut(False))])
     assert seconds_to_state(flight, "AUTOTRACK/FITTED", T + 45.0) < 3.0

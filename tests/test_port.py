@@ -129,6 +129,32 @@ def test_p2_a_silent_link_is_dropped_and_opened_again() -> None:
     play(story)
 
 
+def test_a_connection_that_was_lost_is_closed_before_the_next_one_is_opened() -> None:
+    """An ACU with one client at a time would refuse the next one, and what is unsent would still go out."""
+
+    async def story(port: AcuPort, link: MemoryLink, _clock: LoopClock) -> None:
+        done: list[str] = []
+        open_it, close_it = link.open, link.close
+
+        async def noted_open() -> None:
+            done.append("open")
+            await open_it()
+
+        async def noted_close() -> None:
+            done.append("close")
+            await close_it()
+
+        link.open, link.close = noted_open, noted_close
+        for _ in range(3):
+            await asyncio.sleep(1.0)
+            port.drop_if_silent(0.5)
+            await asyncio.sleep(0.2)
+            await port.wait_until_up()
+        assert done == ["close", "open"] * 3
+
+    play(story)
+
+
 def test_p3_an_acu_that_another_client_holds_is_asked_again_each_second_and_the_reason_is_kept() -> None:
     async def story(port: AcuPort, link: MemoryLink, _clock: LoopClock) -> None:
         link.is_refused = True
