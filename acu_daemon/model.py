@@ -58,6 +58,9 @@ class Antenna(Protocol):
     @property
     def has_air(self) -> bool: ...
 
+    @property
+    def frame(self) -> str: ...
+
     def refraction_shape(self, el_deg: Array, range_m: npt.ArrayLike) -> tuple[Array, Array]: ...
 
 

@@ -7,11 +7,13 @@ import pytest
 from flights import RISING_TAI_S, climb, demo_target, worst_error_deg
 from made_orbits import circular
 
+from acu_daemon.assist.estimators.full.carry_over import CarryOver, carry_over_of, why_other_frame
 from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
 from acu_daemon.assist.mount_model import encoder_look
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.cli.simulated import station_air
 from acu_daemon.control.tracking.pass_plan import plan_pass
+from acu_daemon.edge.carry_over_file import from_json, to_json
 from acu_daemon.model import AngleBias, AxisLimits, Correction, FitResult, Readings, Site, Station
 from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.passes import find_passes
@@ -115,3 +117,24 @@ def test_a_flight_in_air_that_was_told_holds_the_satellite_through_a_loss() -> N
     assert geometric is not None
     assert row.satellite_el_deg is not None
     assert 0.02 < row.satellite_el_deg - geometric[1] < 0.1
+
+
+def test_a_fit_in_a_vacuum_is_not_carried_into_air_nor_biases_to_another_mount() -> None:
+    def carried(site: Site) -> CarryOver:
+        fit = FitResult("full", Correction(), SOURCE.epoch_tai_s, 100, 0, 0.0, 0.0, 0.0, covariance=np.eye(13))
+        kept = carry_over_of(fit, SOURCE, site)
+        assert kept is not None
+        return from_json(to_json("SAT", kept), "SAT")
+
+    air = Site(STATION, antenna=AntennaModel(refraction=traced(350.0, STATION)))
+    other_day = Site(STATION, antenna=AntennaModel(refraction=traced(330.0, STATION)))
+    elsewhere = replace(IN_AIR, station=replace(STATION, name="elsewhere"))
+    assert why_other_frame(carried(IN_VACUUM), IN_VACUUM) == ""
+    assert why_other_frame(carried(air), other_day) == ""
+    assert why_other_frame(carried(air), elsewhere) == ""
+    assert "[atmosphere] refraction or [mount] has changed" in why_other_frame(carried(IN_VACUUM), air)
+    assert "[atmosphere] refraction or [mount] has changed" in why_other_frame(carried(air), IN_AIR)
+    assert "fitted with air" in why_other_frame(carried(IN_VACUUM), elsewhere)
+    old = to_json("SAT", carried(IN_VACUUM))
+    del old["frame"]
+    assert from_json(old, "SAT").frame == ""

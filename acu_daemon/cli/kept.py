@@ -10,7 +10,14 @@ from typing import Any
 import structlog
 
 from acu_daemon.assist.estimators.estimator import has_covariance
-from acu_daemon.assist.estimators.full.carry_over import CarryOver, carry_over_of, resume_of, why_not, why_not_resume
+from acu_daemon.assist.estimators.full.carry_over import (
+    CarryOver,
+    carry_over_of,
+    resume_of,
+    why_not,
+    why_not_resume,
+    why_other_frame,
+)
 from acu_daemon.cli.options import Target
 from acu_daemon.config.to_settings import estimator_settings
 from acu_daemon.control.state import ControlState, Held, remembered
@@ -145,8 +152,9 @@ def _carried(target: Target, path: Path, now_tai_s: float) -> CarryOver | None:
     if carried is None:
         return None
     log: Any = structlog.get_logger("carry_over")
-    reason = why_not(
-        carried, target.elements.propagator, estimator_settings(target.station, target.satellite), now_tai_s
+    settings = estimator_settings(target.station, target.satellite)
+    reason = why_other_frame(carried, target.station.site) or why_not(
+        carried, target.elements.propagator, settings, now_tai_s
     )
     if reason:
         log.warning("carry_over.dropped", reason=reason, file=str(path))

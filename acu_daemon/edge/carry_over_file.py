@@ -105,6 +105,7 @@ def to_json(satellite: str, carried: CarryOver) -> dict[str, Any]:
         "at_tai_s": carried.at_tai_s,
         "estimator": carried.estimator,
         "station": asdict(carried.station),
+        "frame": carried.frame,
         "elements": {
             "kind": carried.elements_kind,
             "epoch_utc": utc_text(carried.elements_epoch_tai_s),
@@ -137,6 +138,7 @@ def from_json(read: Any, satellite: str) -> CarryOver:
         bias=AngleBias(**_fields(read["bias"], AngleBias)),
         station_shift_enu_m=(east_m, north_m, up_m),
         covariance=_covariance(read["covariance"]),
+        frame=str(read.get("frame", "")),
     )
 
 

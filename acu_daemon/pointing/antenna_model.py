@@ -75,6 +75,14 @@ class AntennaModel:
         """Whether there is refraction."""
         return self.refraction is not None
 
+    @property
+    def frame(self) -> str:
+        """What fits' biases are relative to, as text; the weather of the day does not matter, a scale is fitted."""
+        terms = [
+            f"{name} {value:g}" for name, value in zip(TERMS, self.mount.terms_deg().tolist(), strict=True) if value
+        ]
+        return "; ".join(["air" if self.has_air else "vacuum", *terms])
+
     def refraction_shape(self, el_deg: Array, range_m: npt.ArrayLike = np.inf) -> tuple[Array, Array]:
         """Give the refraction at geometric elevations, its value at 45 deg being 1, and its derivative, 1 / deg.
 

@@ -64,6 +64,7 @@ class CarryOver:
     bias: AngleBias
     station_shift_enu_m: tuple[float, float, float]
     covariance: Array = field(compare=False, repr=False)  # (13, 13), see estimated_states
+    frame: str = ""  # Antenna.frame of the site; empty: a perfect mount in a vacuum
     is_of_this_pass: bool = False  # of the pass in progress, left by a daemon that was started again: it does not age
 
 
@@ -94,12 +95,34 @@ def why_not_resume(
         return "it is from a later time than now, or of long ago"
     if carried.station != site.station or carried.estimator != estimator:
         return "the station or the estimator has changed"
+    if why := why_other_frame(carried, site):
+        return why
     if not _has_same_elements(carried, source):
         return "the elements have changed"
     sigma = _prior_sigma(carried, source, settings)
     sigma[ORBIT] *= WIDTHS[-1].factor
     sigma[_MEAN_ANOMALY] += radians(WIDTHS[-1].along_deg)
     return _too_far(carried, sigma, has_covariance=has_covariance)
+
+
+def why_other_frame(carried: CarryOver, site: Site) -> str:
+    """Why a fit says nothing with this antenna; empty where it does: what a fit in a vacuum took for an orbit was air.
+
+    Of another station only the orbit is carried, whatever the mount was.
+    """
+    frame = frame_of(site)
+    if carried.station != site.station:
+        return (
+            ""
+            if carried.frame.startswith("air") == frame.startswith("air")
+            else "it was fitted with air, or without, and this station is not"
+        )
+    return "" if carried.frame == frame else "[atmosphere] refraction or [mount] has changed"
+
+
+def frame_of(site: Site) -> str:
+    """Antenna.frame of a site; empty: a perfect mount in a vacuum."""
+    return "" if site.antenna is None else site.antenna.frame
 
 
 def carry_over_of(fit: FitResult, source: Propagator, site: Site) -> CarryOver | None:
@@ -124,6 +147,7 @@ def _of(fit: FitResult, covariance: Array, source: Propagator, site: Site) -> Ca
         bias=fit.bias,
         station_shift_enu_m=fit.station_shift_enu_m,
         covariance=covariance,
+        frame=frame_of(site),
     )
 
 
