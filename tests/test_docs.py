@@ -51,12 +51,6 @@ OUTSIDE = {
     ),
     "an issue by its number": re.compile(r"\b[Ii]ssues? #?\d+\b"),
 }
-# Being moved: they cite the same outside things, and are converted where they come to rest.
-NOT_YET = ("acu_daemon/control/",)
-
-
-def is_converted(path: Path) -> bool:
-    return not path.as_posix().startswith(NOT_YET)
 
 
 @cache
@@ -166,7 +160,7 @@ def wrong_citations(text: str) -> Iterator[str]:
                 yield f"decision {number}: no such record"
 
 
-@pytest.mark.parametrize("path", [*PAGES, *filter(is_converted, SOURCES)], ids=str)
+@pytest.mark.parametrize("path", [*PAGES, *SOURCES], ids=str)
 def test_nothing_cites_what_is_not_in_the_project(path: Path) -> None:
     said = said_in(path)
     assert [*outside_citations(said), *wrong_citations(said)] == []
