@@ -41,17 +41,13 @@ class Antenna(Protocol):
     Angles in degrees, () or (N,), azimuths continuous; range_m: the satellite's distance.
     """
 
-    def encoders_deg(
-        self, az_deg: npt.ArrayLike, el_deg: npt.ArrayLike, range_m: npt.ArrayLike
-    ) -> tuple[Array, Array]: ...
-
     def geometric_deg(
         self, encoder_az_deg: npt.ArrayLike, encoder_el_deg: npt.ArrayLike, range_m: npt.ArrayLike
     ) -> tuple[Array, Array]: ...
 
-    def rates_deg_s(
+    def with_rates(
         self, az_deg: Array, el_deg: Array, range_m: Array, az_rate_deg_s: Array, el_rate_deg_s: Array
-    ) -> tuple[Array, Array]: ...
+    ) -> tuple[Array, Array, Array, Array]: ...
 
     def apparent_el_deg(self, el_deg: npt.ArrayLike, range_m: npt.ArrayLike) -> Array: ...
 

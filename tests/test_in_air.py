@@ -1,9 +1,13 @@
 """The daemon in air, with a surveyed mount: readings, fits, predictions, plans, passes through one antenna model."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import acu_daemon
+from config_files import BROUWER, write
+from config_files import STATION as STATION_FILE
 from flights import RISING_TAI_S, climb, demo_target, worst_error_deg
 from made_orbits import circular
 
@@ -28,6 +32,7 @@ STATION = Station("Cuiaba", -15.53, -56.07, 277.0)
 ANTENNA = AntennaModel(Mount(0.5, -0.3, 0.02, 0.015, -0.02, 0.01, 0.03), traced(350.0, STATION))
 IN_AIR, IN_VACUUM = Site(STATION, antenna=ANTENNA), Site(STATION)
 SOURCE = circular()
+NAMED_AIR = STATION_FILE + "\n[atmosphere]\nrefraction = true\n"
 LOOKED_DEG = 1e-9
 RATES_DEG_S = 3e-5
 
@@ -138,3 +143,15 @@ def test_a_fit_in_a_vacuum_is_not_carried_into_air_nor_biases_to_another_mount()
     old = to_json("SAT", carried(IN_VACUUM))
     del old["frame"]
     assert from_json(old, "SAT").frame == ""
+
+
+def test_check_tells_the_air_that_is_reckoned_with(tmp_path: Path) -> None:
+    told = NAMED_AIR + "pressure_hpa = 990.0\n"
+    lines = acu_daemon("check", "--config", write(tmp_path, told, scd=BROUWER)).out.splitlines()
+    (line,) = [line for line in lines if line[7:].startswith("air ")]
+    assert line.startswith("GO")
+    assert "990 hPa" in line
+    assert "part of it the standard air's: N 3" in line
+    assert "appears 0.2" in line
+    without = acu_daemon("check", "--config", write(tmp_path, STATION_FILE, scd=BROUWER)).out.splitlines()
+    assert not [line for line in without if line[7:].startswith("air ")]

@@ -45,9 +45,9 @@ def encoder_look(
 
 
 def _on_encoders(seen: Look, antenna: Antenna) -> Look:
-    geometric = (seen.az_deg, seen.el_deg, seen.range_m)
-    az_deg, el_deg = antenna.encoders_deg(*geometric)
-    az_rate_deg_s, el_rate_deg_s = antenna.rates_deg_s(*geometric, seen.az_rate_deg_s, seen.el_rate_deg_s)
+    az_deg, el_deg, az_rate_deg_s, el_rate_deg_s = antenna.with_rates(
+        seen.az_deg, seen.el_deg, seen.range_m, seen.az_rate_deg_s, seen.el_rate_deg_s
+    )
     return Look(az_deg % 360.0 % 360.0, el_deg, seen.range_m, az_rate_deg_s, el_rate_deg_s)
 
 

@@ -120,6 +120,8 @@ def _findings(config: Path, satellite: str | None, now_tai_s: float, state: Path
     if earth.about or earth.warning:
         said = "; ".join(text for text in (earth.about, earth.warning) if text)
         yield Finding(WARN if earth.warning else GO, "Earth orientation", said)
+    if air := station.atmosphere.told(station.site.station):
+        yield Finding(GO, "air", air)
     names = [satellite] if satellite else satellite_names(config)
     if not names:
         yield Finding(NO_GO, "satellites", f"{config}/satellites holds no satellite; put a NAME.toml there")

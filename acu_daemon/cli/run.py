@@ -290,6 +290,8 @@ def _announce(target: Target, coming: Pass, clock: SystemClock, *, is_shadow: bo
     )
     for warning in target.elements.warnings:
         log.warning("elements.warning", reason=warning)
+    if air := target.station.atmosphere.told(target.station.site.station):
+        log.info("run.air", air=air)
     if target.earth.about:
         log.info("earth.orientation", age=target.earth.about)
     if target.elements.choice:

@@ -58,6 +58,20 @@ class AtmosphereSection(Section):
         """The refraction of that air; None: a vacuum."""
         return traced(refractivity(self.air(station)), station) if self.has_refraction else None
 
+    def told(self, station: Station) -> str:
+        """Say what air is reckoned with, and what it raises; empty: none."""
+        refraction = self.traced(station)
+        if refraction is None:
+            return ""
+        air = self.air(station)
+        given = {"pressure_hpa", "temperature_c", "humidity_percent"} & self.model_fields_set
+        whence = "as given" if len(given) == 3 else "part of it the standard air's" if given else "the standard air's"
+        raised_deg = float(refraction.apparent_el_deg(5.0, 1.5e6)) - 5.0
+        return (
+            f"{air.pressure_hpa:.0f} hPa, {air.temperature_c:.0f} deg C, {air.humidity_percent:.0f} % humidity, "
+            f"{whence}: N {refraction.surface_n:.0f}, a satellite at 5 deg appears {raised_deg:.2f} deg higher"
+        )
+
     def cot_sigma_deg(self, station: Station) -> float:
         """What a tenth of the refraction is at 45 deg of elevation, where cot(el) is 1: 1 sigma of a scale."""
         refraction = self.traced(station)

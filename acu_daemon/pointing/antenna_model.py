@@ -95,12 +95,15 @@ class AntennaModel:
         raised_deg, slope = self.refraction.raised_deg(el_deg + raised_deg, range_m)
         return raised_deg / at_45_deg, slope / at_45_deg
 
-    def rates_deg_s(
+    def with_rates(
         self, az_deg: Array, el_deg: Array, range_m: Array, az_rate_deg_s: Array, el_rate_deg_s: Array
-    ) -> tuple[Array, Array]:
-        """Turn geometric directions and their rates into the rates of the encoders; the range's is left out."""
-        by = self.with_partials(az_deg, el_deg, range_m)[2].by_direction
+    ) -> tuple[Array, Array, Array, Array]:
+        """Turn geometric directions and their rates into angles and rates of the encoders; the range's is left out."""
+        encoder_az_deg, encoder_el_deg, partials = self.with_partials(az_deg, el_deg, range_m)
+        by = partials.by_direction
         return (
+            encoder_az_deg,
+            encoder_el_deg,
             by[..., 0, 0] * az_rate_deg_s + by[..., 0, 1] * el_rate_deg_s,
             by[..., 1, 0] * az_rate_deg_s + by[..., 1, 1] * el_rate_deg_s,
         )
