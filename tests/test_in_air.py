@@ -16,6 +16,7 @@ from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
 from acu_daemon.assist.mount_model import encoder_look
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.cli.simulated import station_air
+from acu_daemon.config.to_settings import estimator_settings
 from acu_daemon.control.tracking.pass_plan import plan_pass
 from acu_daemon.edge.carry_over_file import from_json, to_json
 from acu_daemon.model import AngleBias, AxisLimits, Correction, FitResult, Readings, Site, Station
@@ -155,3 +156,13 @@ def test_check_tells_the_air_that_is_reckoned_with(tmp_path: Path) -> None:
     assert "appears 0.2" in line
     without = acu_daemon("check", "--config", write(tmp_path, STATION_FILE, scd=BROUWER)).out.splitlines()
     assert not [line for line in without if line[7:].startswith("air ")]
+
+
+def test_a_surveys_sigma_says_how_far_a_fit_may_move_the_encoders() -> None:
+    def sigmas(**mount: float) -> tuple[float, float, float]:
+        target = demo_target(mount=mount)
+        found = estimator_settings(target.station, target.satellite)
+        return found.bias_sigma_azimuth_deg, found.bias_sigma_elevation_deg, found.bias_sigma_azimuth_sec_deg
+
+    assert sigmas() == (0.1, 0.1, 0.003)
+    assert sigmas(ia_sigma_deg=0.01, ie_sigma_deg=0.0, ca_sigma_deg=0.005) == (0.01, 0.0, 0.005)

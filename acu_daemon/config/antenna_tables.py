@@ -146,19 +146,22 @@ class MountSection(Section):
         default=None,
         ge=0,
         le=10,
-        description="How well IA is known, 1 sigma; left out: not surveyed.  Decides nothing yet: no fit moves it.",
+        description="How well IA is known, 1 sigma; left out: not surveyed.  Decides how far a fit may move it, "
+        "in place of [readings] bias_sigma_azimuth_deg.",
     )
     ie_sigma_deg: float | None = Field(
         default=None,
         ge=0,
         le=10,
-        description="How well IE is known, 1 sigma; left out: not surveyed.  Decides nothing yet: no fit moves it.",
+        description="How well IE is known, 1 sigma; left out: not surveyed.  Decides how far a fit may move it, "
+        "in place of [readings] bias_sigma_elevation_deg.",
     )
     ca_sigma_deg: float | None = Field(
         default=None,
         ge=0,
         le=1,
-        description="How well CA is known, 1 sigma; left out: not surveyed.  Decides nothing yet: no fit moves it.",
+        description="How well CA is known, 1 sigma; left out: not surveyed.  Decides how far a fit may move it, "
+        "in place of [readings] bias_sigma_azimuth_sec_deg.",
     )
     npae_sigma_deg: float | None = Field(
         default=None,

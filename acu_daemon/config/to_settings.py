@@ -48,15 +48,19 @@ def estimator_settings(station: StationFile, satellite: SatelliteFile) -> Estima
         beamwidth_deg=station.receiver.beamwidth_deg,
         azimuth=station.acu.azimuth.limits(),
         elevation=station.acu.elevation.limits(),
-        bias_sigma_azimuth_deg=station.readings.bias_sigma_azimuth_deg,
-        bias_sigma_elevation_deg=station.readings.bias_sigma_elevation_deg,
-        bias_sigma_azimuth_sec_deg=station.readings.bias_sigma_azimuth_sec_deg,
+        bias_sigma_azimuth_deg=_surveyed(station.mount.ia_sigma_deg, station.readings.bias_sigma_azimuth_deg),
+        bias_sigma_elevation_deg=_surveyed(station.mount.ie_sigma_deg, station.readings.bias_sigma_elevation_deg),
+        bias_sigma_azimuth_sec_deg=_surveyed(station.mount.ca_sigma_deg, station.readings.bias_sigma_azimuth_sec_deg),
         bias_sigma_elevation_cot_deg=hypot(
             station.readings.bias_sigma_elevation_cot_deg, station.atmosphere.cot_sigma_deg(station.site.station)
         ),
         orbit_sigmas=_orbit_sigmas(satellite.uncertainty),
         station_sigma_m=station.station.uncertainty_m / 2**0.5,  # of east and of north each
     )
+
+
+def _surveyed(sigma_deg: float | None, otherwise_deg: float) -> float:
+    return otherwise_deg if sigma_deg is None else sigma_deg
 
 
 def _orbit_sigmas(given: UncertaintySection) -> StateSigmas | None:
