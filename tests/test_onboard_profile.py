@@ -281,7 +281,7 @@ def test_an_attitude_file_gives_the_profile_of_the_plan_it_was_made_from(tmp_pat
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (("margin_deg = 2.0", "margin_deg = 0.0"), "antenna.margin_deg = 0.0: expected more than 0"),
+        (("margin_deg = 2.0", "margin_deg = 0.0"), "antenna.margin_deg = 0.0: expected at least 0.001"),
         (("margin_deg = 2.0", "margins_deg = 2.0"), "did you mean margin_deg?"),
         (("min_elevation_deg = 5.0", "min_elevation_deg = 89.0"), "change from_utc, lower min_elevation_deg"),
         (("roll_deg = -18.0", "roll_deg = -45.0"), "the body turns 30 deg at the most"),

@@ -21,7 +21,8 @@ from acu_daemon.onboard.profile import METHODS, Profile, Task, peak_rate_deg_s
 from acu_daemon.onboard.recheck import UNLIMITED, check_certificate, check_peaks, grid_s
 from acu_daemon.report.onboard_text import header, scenario_table, summary
 
-_WIDEST_MARGIN_DEG = 30.0
+_LEAST_MARGIN_DEG, _WIDEST_MARGIN_DEG = 0.001, 30.0
+_MARGINS = f"{_LEAST_MARGIN_DEG:g} to {_WIDEST_MARGIN_DEG:g} deg"
 
 
 def profile(
@@ -61,8 +62,8 @@ def profile(
     for warning in planned.warnings:
         typer.echo(f"warning: {warning}", err=True)
     planned = _chosen(planned, method, objective)
-    if margin_deg is not None and not 0.0 < margin_deg <= _WIDEST_MARGIN_DEG:
-        raise UsageError(f"--margin-deg {margin_deg:g}: expected more than 0 and at most {_WIDEST_MARGIN_DEG:g}")
+    if margin_deg is not None and not _LEAST_MARGIN_DEG <= margin_deg <= _WIDEST_MARGIN_DEG:
+        raise UsageError(f"--margin-deg {margin_deg:g}: expected {_MARGINS}")
     task, wanted = planned.task(margin_deg), planned.file.profile
     made = make(task, planned.station, wanted.method, wanted.objective, planned.file.antenna.play)
     for line in [*summary(planned, task, made, _single_deg_s(task, planned)), *map(str, made.second)]:
@@ -128,8 +129,8 @@ def scenarios(
     The same seed makes the same scenario, whatever the count and the processes: `--count 1 --seed 17` runs one again.
     """
     refuse_unwritable(json_file)
-    if not 0.0 < margin_deg <= _WIDEST_MARGIN_DEG:
-        raise UsageError(f"--margin-deg {margin_deg:g}: expected more than 0 and at most {_WIDEST_MARGIN_DEG:g}")
+    if not _LEAST_MARGIN_DEG <= margin_deg <= _WIDEST_MARGIN_DEG:
+        raise UsageError(f"--margin-deg {margin_deg:g}: expected {_MARGINS}")
     runs = [Run(seed + k, margin_deg, imaging) for k in range(count)]
     with progress_bar("scenarios") as on_done:
         rows = results_of(run_campaign(run_scenario, runs, jobs=jobs, dask=dask, on_done=on_done))
@@ -185,8 +186,8 @@ def _alone(found: ParameterFile) -> list[Check]:
 def _with_pass(found: ParameterFile, path: Path) -> list[Check]:
     planned = load_pass(path)
     margin_deg = found.number("MARGIN_DEG")
-    if margin_deg is not None and not 0.0 < margin_deg <= _WIDEST_MARGIN_DEG:
-        raise UsageError(f"MARGIN_DEG = {margin_deg:g}: expected more than 0 and at most {_WIDEST_MARGIN_DEG:g}")
+    if margin_deg is not None and not _LEAST_MARGIN_DEG <= margin_deg <= _WIDEST_MARGIN_DEG:
+        raise UsageError(f"MARGIN_DEG = {margin_deg:g}: expected {_MARGINS}")
     task = planned.task(margin_deg, (found.start_tai_s, found.start_tai_s + found.end_s))
     checks = check_profile(task, found.profile, planned.file.antenna.play)
     return [*checks, *check_peaks(found), *check_certificate(found, task)]

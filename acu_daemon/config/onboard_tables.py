@@ -134,7 +134,7 @@ class BoresightSection(Section):
 
 
 class AntennaSection(Section):
-    margin_deg: float = Field(gt=0, le=30)
+    margin_deg: float = Field(ge=0.001, le=30)
     azimuth: AzimuthAxis = AzimuthAxis()
     elevation: ElevationAxis = ElevationAxis()
     mount: Misalignment = Misalignment()
