@@ -7,7 +7,7 @@ import pytest
 from made_orbits import EPOCH_TAI_S, circular, site
 from real_passes import sky_angles_deg
 
-from acu_daemon.assist.session.prediction import predict
+from acu_daemon.assist.session.prediction import _continuous, predict
 from acu_daemon.assist.session.refit import RefitRequest, RefitSetup, predict_from
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.control.tracking.track_frame import beside
@@ -58,10 +58,11 @@ def test_azimuth_is_continuous_through_north_and_starts_on_the_turn_asked_for():
         assert np.floor(buffer.az_deg.min() / 360.0) < np.floor(buffer.az_deg.max() / 360.0)
 
 
-@pytest.mark.parametrize("offset_deg", [1e-3, -1e-3, 5e-3, 0.0209])
-def test_past_the_zenith_azimuth_turns_by_half_a_turn_the_way_its_rate_says(offset_deg):
+@pytest.mark.parametrize("offset_deg", [1e-3, -1e-3, 2e-3, -2e-3, 5e-3, -5e-3, 0.0209, -0.0209])
+@pytest.mark.parametrize("i_deg", [98.6, 81.4, 60.0])
+def test_past_the_zenith_azimuth_turns_by_half_a_turn_the_way_its_rate_says(offset_deg, i_deg):
     """From 0.01 deg beside the zenith on, most of the half turn falls into one step."""
-    propagator = circular()
+    propagator = circular(i_deg)
     buffer = _predict(propagator, site(longitude_deg=offset_deg), -45.0)
     turned = buffer.az_deg[-1] - buffer.az_deg[0]
     assert 150.0 < abs(turned) < 210.0
@@ -131,3 +132,9 @@ def test_however_far_back_a_buffer_begins_its_turn_is_the_one_asked_for_at_the_i
         buffer = predict_from(setup, None, request, Model.ELEMENTS)
         assert abs(buffer.at(now_tai_s).az_deg - near_az_deg) <= 180.0 + 1e-6
         assert buffer.made_at_tai_s == now_tai_s
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_step_of_a_little_more_than_half_a_turn_goes_the_way_of_the_rates_to_both_sides(side):
+    az_deg, rates_deg_s = side * np.array([10.0, 190.2, 191.0]), side * np.array([900.0, 900.0, 1.0])
+    assert np.diff(_continuous(az_deg % 360.0, rates_deg_s, 0.1)) == pytest.approx(side * np.array([180.2, 0.8]))

@@ -421,3 +421,13 @@ def test_an_address_is_one_character_from_1_to_o() -> None:
     assert address_byte("1") == 0x31
     with pytest.raises(ValueError, match="from '1' to 'o'"):
         address_byte("0")
+
+
+@pytest.mark.parametrize("address", ["1", "o"])
+@pytest.mark.parametrize("cmd", [0x30, 0x7F])
+def test_the_ends_of_the_addresses_and_of_the_commands_are_heard_whole_and_byte_by_byte(address: str, cmd: int) -> None:
+    sent = Frame(ACK, address_byte(address), cmd)
+    data = encode_frame(sent)
+    assert FrameDecoder(bytes((ACK, NAK))).feed(data) == [sent]
+    decoder = FrameDecoder(bytes((ACK, NAK)))
+    assert [event for byte in data for event in decoder.feed(bytes((byte,)))] == [sent]

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acu_daemon.orbit.element_set import ElementSet, Problem
-from acu_daemon.orbit.timescales import utc_text
+from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 from acu_daemon.orbit.tle import catalogue_number, parse_tle
 
 NAME = "ISS (ZARYA)"
@@ -239,3 +239,17 @@ def test_no_damage_to_a_set_makes_the_parser_fail_or_lose_the_set_before_it(data
     for candidate in (lines, with_right_checksums):
         sets, _ = parse(OTHER_ONE, OTHER_TWO, *candidate)
         assert sets[0].norad_id == 41335
+
+
+@pytest.mark.parametrize(
+    ("day", "utc"),
+    [
+        ("22001.00000000", "2022-01-01T00:00:00Z"),
+        ("22365.00000000", "2022-12-31T00:00:00Z"),
+        ("24366.00000000", "2024-12-31T00:00:00Z"),
+    ],
+)
+def test_an_epoch_may_be_the_first_instant_of_the_first_and_of_the_last_day_of_a_year(day: str, utc: str) -> None:
+    (one,), problems = parse_tle("\n".join((edited(ONE, 19, day), TWO)), "f")
+    assert problems == []
+    assert one.epoch_tai_s == tai_from_utc(utc)
