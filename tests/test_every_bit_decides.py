@@ -9,7 +9,7 @@ from test_tick import AZ_DEG, CONFIG, EL_DEG, NOW, PLAN, SKY, path, ready, saw, 
 
 from acu_daemon.control.orders import Orders
 from acu_daemon.control.safety.status_plausibility import contradictions
-from acu_daemon.control.state import ControlState, Held
+from acu_daemon.control.state import ControlState, Held, Sent
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Exchange, Observation, Sky, TickInput
 from acu_daemon.control.tracking.state_table import TrackState
@@ -244,3 +244,19 @@ def test_each_fault_bit_alone_explains_the_mode_fault(flag: str) -> None:
     seen = replace(consistent(AcuMode.FAULT), **dict.fromkeys(FAULT_FLAGS, False))
     assert contradictions(seen) == ("mode and fault",)
     assert contradictions(replace(seen, **{flag: True})) == ()
+
+
+@pytest.mark.parametrize("unwritten_s", [1.0, 5.0])
+def test_a_standby_after_a_pause_of_the_writes_may_be_the_register_watchdogs_though_it_answers_a_write(
+    unwritten_s: float,
+) -> None:
+    config = replace(CONFIG, register_watchdog_s=2.0)
+    before = remembering(
+        ready(TrackState.HOLD_TLE, status(AcuMode.REMOTE_BACKUP)),
+        held=Held(),
+        hold_from_tai_s=NOW,
+        in_force=(NOW - unwritten_s, AZ_DEG, EL_DEG),
+        commands=(Sent(AZ_DEG, EL_DEG, False),),
+    )
+    state, _ = tick(before, TickInput(saw(status(AcuMode.STANDBY)), SKY, NOW), config)
+    assert (state.arming.disarmed_by == "") == (unwritten_s > 2.0)
