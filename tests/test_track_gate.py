@@ -15,6 +15,7 @@ from acu_daemon.assist.reading_gate import (
     ACCELERATION,
     BELIED,
     OFF_PATH,
+    OUTLIER,
     SIDE_LOBE,
     TOO_FAST,
     WRONG_TARGET,
@@ -160,6 +161,16 @@ def test_the_gate_serves_every_estimator(estimator: str) -> None:
     spoilt = _feed(setup, readings)[-1]
     assert _apart_deg(setup, spoilt, _feed(setup, readings.part(~_is_bad(readings)))[-1], ahead_tai_s) < UNCHANGED_DEG
     assert spoilt.gate.counts[WRONG_TARGET] > 0.9 * np.count_nonzero(_is_bad(readings))
+
+
+def test_the_gate_judges_alike_whatever_the_estimator() -> None:
+    """By a fit of its own to all readings believed, also where the estimator has no covariance."""
+    readings = _stranger(_good(1.0), -0.04, 0.02)
+    counts = {}
+    for estimator in ("full", "kalman"):
+        reply = _feed(_setup(estimator=estimator), readings)[-1]
+        counts[estimator] = {reason: count for reason, count in reply.gate.counts.items() if reason != OUTLIER}
+    assert counts["kalman"] == counts["full"]
 
 
 def test_while_an_axis_accelerates_near_its_limit_readings_are_left_out() -> None:
