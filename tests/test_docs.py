@@ -25,6 +25,7 @@ PAGES = sorted(
     for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("config/**/*.md"))
     if path.is_file()
 )
+PICTURES = sorted(path.relative_to(ROOT) for path in ROOT.glob("docs/**/*.svg"))
 SOURCES = sorted(
     path.relative_to(ROOT)
     for folder in ("acu_daemon", "scripts", "tests", "config", ".ci")
@@ -160,7 +161,7 @@ def wrong_citations(text: str) -> Iterator[str]:
                 yield f"decision {number}: no such record"
 
 
-@pytest.mark.parametrize("path", [*PAGES, *SOURCES], ids=str)
+@pytest.mark.parametrize("path", [*PAGES, *PICTURES, *SOURCES], ids=str)
 def test_nothing_cites_what_is_not_in_the_project(path: Path) -> None:
     said = said_in(path)
     assert [*outside_citations(said), *wrong_citations(said)] == []
