@@ -5,13 +5,14 @@ A key's description is "What it is.  Decides what."; its unit stands in its name
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
+from acu_daemon.config.onboard_tables import PassFile
 from acu_daemon.config.satellite_tables import SatelliteFile
 from acu_daemon.config.section import Section
 from acu_daemon.config.station_tables import StationFile
@@ -22,6 +23,11 @@ FILES: dict[str, tuple[type[Section], str]] = {
     "satellites/NAME.toml": (
         SatelliteFile,
         "One file for each satellite; NAME is what `--satellite` takes.  `config/satellites/scd-1.toml` is an example.",
+    ),
+    "PASS.toml": (
+        PassFile,
+        "A pass of a satellite with a steerable antenna, for `acu-daemon onboard profile` ([onboard.md](onboard.md)).  "
+        "`config/onboard/pass.toml` is an example; files are beside it.",
     ),
 }
 DECIDES = re.compile(r"(?s)(.+?[.)])  (Decides .+\.)")
@@ -40,8 +46,7 @@ end in their unit.  **Needed** keys have no default; every other key may be left
 keys.  An unknown key, a wrong type and an impossible value stop the start with file, key, value and what was expected,
 exit status 2; `acu-daemon check --config DIR` looks without moving anything.
 
-The pass of a satellite's own antenna, PASS.toml, has its keys in [onboard.md](onboard.md#passtoml), the scenario of the
-simulator in `acu-daemon fake-acu --help`.
+The keys of the simulator's scenario stand in `acu-daemon fake-acu --help`.
 """
 
 
@@ -60,25 +65,30 @@ class Key:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """One heading with its keys.  kind: of [elements], the values of the key that chooses it."""
+    """One heading with its keys.  kind: of [elements], the values of the key that chooses it.  is_list: any number."""
 
     name: str
     meaning: str
     keys: tuple[Key, ...]
     kind: str = ""
+    is_list: bool = False
 
 
-def tables_of(model: type[Section], under: str = "", meaning: str = "", kind: str = "") -> Iterator[Table]:
+def tables_of(
+    model: type[Section], under: str = "", meaning: str = "", kind: str = "", is_list: bool = False
+) -> Iterator[Table]:
     """Those of a file, in the order of the models: a table's own keys, then the tables in it."""
     tables = {name: sections_of(field) for name, field in model.model_fields.items()}
     keys = tuple(key_of(under, name, model.model_fields[name]) for name, below in tables.items() if not below)
     if under:
-        yield Table(under, meaning, keys, kind)
+        yield Table(under, meaning, keys, kind, is_list)
     for name, below in tables.items():
         field = model.model_fields[name]
         for section in below:
             choice = " or ".join(_written(value) for value in get_args(_kind(section))) if len(below) > 1 else ""
-            yield from tables_of(section, f"{under}.{name}".lstrip("."), field.description or "", choice)
+            place = f"{under}.{field.alias or name}".lstrip(".")
+            is_many = get_origin(field.annotation) is Sequence
+            yield from tables_of(section, place, field.description or "", choice, is_many)
 
 
 def sections_of(field: FieldInfo) -> list[type[Section]]:
@@ -111,7 +121,7 @@ def range_of(field: FieldInfo) -> str:
     extra = field.json_schema_extra
     if isinstance(extra, dict) and "range" in extra:
         return str(extra["range"])
-    kinds = {field.annotation, *get_args(field.annotation)}
+    kinds = set(_kinds(field.annotation))
     if bool in kinds:
         return "`true`, `false`"
     if choices := [value for value in kinds if isinstance(value, str)]:
@@ -121,7 +131,14 @@ def range_of(field: FieldInfo) -> str:
         return f"{given['ge']:.9g} to {given['le']:.9g}"
     if given:
         return ", ".join(f"{sign}{given[name]:.9g}" for name, sign in BOUNDS if name in given)
-    return "text" if str in kinds else "keys of that table" if dict in {*kinds, field.annotation} else ""
+    return "text" if str in kinds else ""
+
+
+def _kinds(annotation: Any) -> Iterator[Any]:
+    """An annotation and all that it is made of."""
+    yield annotation
+    for part in get_args(annotation):
+        yield from _kinds(part)
 
 
 def _written(value: object) -> str:
@@ -134,16 +151,23 @@ def _written(value: object) -> str:
 
 def page() -> str:
     """The whole page."""
-    parts = [HEAD]
+    parts, told = [HEAD], set[Table]()
     for file, (model, intro) in FILES.items():
         parts.append(f"## {file}\n\n{intro}\n")
-        parts += [section_of(table) for table in dict.fromkeys(tables_of(model))]  # [elements.limits] is every kind's
-    return "\n".join([*parts, overrides()])
+        new = [table for table in dict.fromkeys(tables_of(model)) if table not in told]  # [elements] is the satellite's
+        parts += [section_of(table) for table in new]
+        told.update(new)
+        if model is SatelliteFile:
+            parts.append(overrides())
+        if same := dict.fromkeys(f"`[{table.name}]`" for table in tables_of(model) if table not in new):
+            parts.append(f"{', '.join(same)}: as in the files above.\n")
+    return "\n".join(parts)
 
 
 def section_of(table: Table) -> str:
     """A heading and its table."""
-    heading = f"### [{table.name}]" + (f", kind = {table.kind}" if table.kind else "")
+    name = f"[[{table.name}]]" if table.is_list else f"[{table.name}]"
+    heading = f"### {name}" + (f", kind = {table.kind}" if table.kind else "")
     lines = [heading, "", table.meaning]
     if table.keys:
         lines += ["", "| key | unit | default | range | what it is | what it decides |", "|---|---|---|---|---|---|"]
@@ -163,4 +187,6 @@ def overrides() -> str:
 
 if __name__ == "__main__":
     PAGE.write_text(page(), encoding="utf-8")
-    print(f"{PAGE}: {sum(len(t.keys) for model, _ in FILES.values() for t in tables_of(model))} keys")
+    print(
+        f"{PAGE}: {len({key for model, _ in FILES.values() for table in tables_of(model) for key in table.keys})} keys"
+    )

@@ -12,7 +12,16 @@ from script_modules import load
 
 from acu_daemon.config.acu_tables import AcuSection, AxisSection, ElevationSection
 from acu_daemon.config.antenna_tables import MountSection
-from acu_daemon.config.satellite_tables import BrouwerSection, ElementsFileSection, LimitsSection, SatelliteFile
+from acu_daemon.config.onboard_tables import (
+    AttitudeSection,
+    AzimuthAxis,
+    ElevationAxis,
+    HoldRow,
+    ImagingRow,
+    PassSection,
+    TargetRow,
+)
+from acu_daemon.config.satellite_tables import BrouwerSection, ElementsFileSection, LimitsSection
 from acu_daemon.config.section import Section
 from acu_daemon.config.station_tables import SafetySection, StationFile, TimeSection
 from acu_daemon.config.tracking_tables import TrackingSection
@@ -32,7 +41,9 @@ def models_of(model: type[Section]) -> set[type[Section]]:
 
 FIELDS = [
     pytest.param(model, name, id=f"{model.__name__}.{name}")
-    for model in sorted(models_of(StationFile) | models_of(SatelliteFile), key=lambda kind: kind.__name__)
+    for model in sorted(
+        set.union(*(models_of(model) for model, _ in writer.FILES.values())), key=lambda kind: kind.__name__
+    )
     for name in model.model_fields
 ]
 
@@ -85,6 +96,15 @@ OUT_OF_SAID: dict[str, tuple[type[Section], dict[str, Any]]] = {  # ranges that 
     "LimitsSection.max_eccentricity": (LimitsSection, {"min_eccentricity": 0.2}),
     "LimitsSection.max_inclination_deg": (LimitsSection, {"min_inclination_deg": 90.0, "max_inclination_deg": 80.0}),
     "ElementsFileSection.file": (ElementsFileSection, {"kind": "tle", "file": 1}),
+    "PassSection.from_utc": (PassSection, {"from_utc": "2026-01-01"}),
+    "HoldRow.start_utc": (HoldRow, {"start_utc": "2026-01-01T00:00", "duration_s": 1.0}),
+    "TargetRow.start_utc": (TargetRow, HERE | {"start_utc": 1.0, "duration_s": 1.0}),
+    "ImagingRow.start_utc": (ImagingRow, {"start_utc": "now", "duration_s": 1.0}),
+    "AttitudeSection.file": (AttitudeSection, {"file": ""}),
+    "AzimuthAxis.max_rate_deg_s": (AzimuthAxis, {"max_rate_deg_s": 0.0}),
+    "AzimuthAxis.max_acceleration_deg_s2": (AzimuthAxis, {"max_acceleration_deg_s2": 0.0}),
+    "ElevationAxis.max_rate_deg_s": (ElevationAxis, {"max_rate_deg_s": -1.0}),
+    "ElevationAxis.max_acceleration_deg_s2": (ElevationAxis, {"max_acceleration_deg_s2": -1.0}),
     "BrouwerSection.epoch_utc": (BrouwerSection, tomllib.loads(BROUWER)["elements"] | {"epoch_utc": "1989-01-31"}),
 }  # fmt: skip
 
