@@ -1,4 +1,4 @@
-"""assist.screening.path_acceleration: an axis that its path speeds up or slows down, to either side, is not calm."""
+"""assist.screening.path_acceleration: an axis that its path speeds up or slows down, to either side, accelerates."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_orbits import EPOCH_TAI_S, circular, site
 
-from acu_daemon.assist.screening.path_acceleration import LIMIT_SHARE, is_calm
+from acu_daemon.assist.screening.path_acceleration import LIMIT_SHARE, is_low_acceleration
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import AxisLimits
 from acu_daemon.orbit.look import look_at
@@ -18,7 +18,7 @@ SLOW = EstimatorSettings(azimuth=AxisLimits(-270.0, 270.0, 20.0, 0.1), elevation
 
 @pytest.mark.parametrize("longitude_deg", [0.5, -0.5, 1.0, -1.0])  # east and west of the path: to the right and left
 @pytest.mark.parametrize("i_deg", [98.6, 81.4])
-def test_a_path_is_calm_where_the_second_differences_of_its_angles_are_small(
+def test_a_path_is_low_acceleration_where_the_second_differences_of_its_angles_are_small(
     longitude_deg: float, i_deg: float
 ) -> None:
     source, where = circular(i_deg), site(longitude_deg)
@@ -34,7 +34,7 @@ def test_a_path_is_calm_where_the_second_differences_of_its_angles_are_small(
         acceleration_deg_s2 = (ahead + behind) / STEP_S**2
         limit_deg_s2 = LIMIT_SHARE * getattr(SLOW, axis).max_acceleration_deg_s2
         is_clear = np.abs(np.abs(acceleration_deg_s2) / limit_deg_s2 - 1.0) > NEAR_SHARE
-        calm = is_calm(source, where, None, tai_s, settings)
-        assert np.array_equal(calm[is_clear], (np.abs(acceleration_deg_s2) <= limit_deg_s2)[is_clear]), axis
-        kinds |= {(axis, float(sign)) for sign in np.sign(acceleration_deg_s2[is_clear & ~calm])}
+        is_low = is_low_acceleration(source, where, None, tai_s, settings)
+        assert np.array_equal(is_low[is_clear], (np.abs(acceleration_deg_s2) <= limit_deg_s2)[is_clear]), axis
+        kinds |= {(axis, float(sign)) for sign in np.sign(acceleration_deg_s2[is_clear & ~is_low])}
     assert {("azimuth", -1.0), ("azimuth", 1.0), ("elevation", -1.0)} <= kinds

@@ -35,5 +35,5 @@ def test_a_reading_is_tagged_by_what_it_answers_and_never_after_its_first_byte(
     foreground = Foreground(CommonArea(), nobody, nobody, AT_9600, after_tick=lambda: None, on_reading=readings.append)
     seen = status()
     answer = Answer(seen, NOW, None if first_byte_s is None else NOW + first_byte_s)
-    foreground._take_status(answer, seen, command)
+    foreground._hear(command, answer)
     assert [reading.tai_s - NOW for reading in readings] == pytest.approx([sampled_s], abs=TAI_S)
