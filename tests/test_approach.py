@@ -5,14 +5,19 @@ import pytest
 from flights import DEMO_TAI_S, demo_target, events_named, flight_of, the_pass
 from hypothesis import given
 from hypothesis import strategies as st
+from memories import remembering
+from test_tick import AZ_DEG, CONFIG, NOW, SKY, ready, status
 
 from acu_daemon.cli.options import Target, not_covered
 from acu_daemon.cli.virtual_pass import Flight
 from acu_daemon.control.tracking.approach import longest_lead_s, way_s
+from acu_daemon.control.tracking.late_arrival import lateness
 from acu_daemon.control.tracking.register_limiter import CHASE_ACCELERATION_MARGIN, CHASE_RATE_MARGIN
+from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.model import AxisLimits
 from acu_daemon.orbit.look import look_at
 from acu_daemon.pointing.axis import AxisState, step
+from acu_daemon.protocol.messages import AcuMode
 from acu_daemon.sim.scenario import AcuChoice
 from acu_daemon.units import wrap_180
 
@@ -78,6 +83,14 @@ def test_started_in_mid_pass_it_says_how_long_after_the_rise_and_until_it_is_on_
     reached_s = off_the_rise_point_s(flight, target) - said["after_rise_s"] if off_deg else 0.0
     assert said["on_path_s"] == pytest.approx(reached_s, abs=SAID_S)
     assert (said["off_path_deg"] > 30.0) == (off_deg > 0.0)
+
+
+def test_in_mid_pass_the_way_goes_to_the_planned_turn_though_the_bearing_is_the_same() -> None:
+    state = remembering(ready(TrackState.PREPOSITION, status(AcuMode.REMOTE)), az_deg=AZ_DEG - 360.0)
+    (said,) = lateness(state, SKY, NOW, CONFIG)
+    assert said.is_warning
+    assert said.fields["off_path_deg"] == pytest.approx(0.0, abs=0.01)
+    assert said.fields["on_path_s"] > way_s(360.0, CONFIG.azimuth)
 
 
 def test_preposition_s_is_a_floor_for_quick_drives() -> None:

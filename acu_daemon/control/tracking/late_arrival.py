@@ -7,7 +7,6 @@ from acu_daemon.control.tick_input import Sky
 from acu_daemon.control.tracking.approach import BEGIN_S, way_s, way_to
 from acu_daemon.control.tracking.causes import path_point
 from acu_daemon.model import sky_angle_deg
-from acu_daemon.pointing.wrap import nearest_turn
 
 _MEETINGS = 4  # of way and moving path: the next one is nearer than the prediction matters
 
@@ -33,7 +32,8 @@ def _joined(state: ControlState, sky: Sky, now_tai_s: float, after_rise_s: float
     if state.intake.status is None or path is None or not path.is_finite:
         return []
     off_deg = sky_angle_deg(state.intake.az_deg, state.intake.status.el_deg, path.az_deg, path.el_deg)
-    is_on = off_deg <= config.beamwidth_deg / 2
+    is_on_turn = abs(path.az_deg - state.intake.az_deg) < 180.0
+    is_on = is_on_turn and off_deg <= config.beamwidth_deg / 2
     on_path_s = 0.0 if is_on else _until_on_path_s(state, sky, now_tai_s, config)
     fields = {
         "after_rise_s": round(after_rise_s, 1),
@@ -51,8 +51,7 @@ def _until_on_path_s(state: ControlState, sky: Sky, now_tai_s: float, config: Co
         path = path_point(sky, now_tai_s + until_s)
         if path is None or not path.is_finite:
             break
-        turned_deg = nearest_turn(path.az_deg, state.intake.az_deg, config.azimuth)
-        az_deg = path.az_deg if turned_deg is None else turned_deg
-        ways_s = way_s(az_deg - state.intake.az_deg, config.azimuth), way_s(path.el_deg - el_deg, config.elevation)
+        az_way_deg, el_way_deg = path.az_deg - state.intake.az_deg, path.el_deg - el_deg  # to the turn that is planned
+        ways_s = way_s(az_way_deg, config.azimuth), way_s(el_way_deg, config.elevation)
         until_s = BEGIN_S + max(ways_s)
     return until_s
