@@ -34,6 +34,15 @@ from acu_daemon.assist.session.prediction import predict
 from acu_daemon.cli import demo
 from acu_daemon.cli.options import Target, load_target
 from acu_daemon.cli.virtual_pass import Flight, fly
+from acu_daemon.drivers.sa3842.messages import (
+    AcuMode,
+    Backup,
+    Poll,
+    SelectBackup,
+    SelectMode,
+    WriteAndPoll,
+    WriteParameter,
+)
 from acu_daemon.edge.campaign import results_of, run_campaign
 from acu_daemon.model import (
     AxisLimits,
@@ -53,7 +62,6 @@ from acu_daemon.orbit.sgp4_source import Sgp4Propagator
 from acu_daemon.orbit.timescales import gmst_rad, tai_from_utc
 from acu_daemon.orbit.tle import parse_tle
 from acu_daemon.pointing.keyhole import follow_path
-from acu_daemon.protocol.messages import AcuMode, Backup, Poll, SelectBackup, SelectMode, WriteAndPoll, WriteParameter
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.scenario import AcuChoice, Encoder, Loss, Scenario

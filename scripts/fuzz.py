@@ -17,6 +17,9 @@ import structlog
 
 with atheris.instrument_imports(include=["acu_daemon"]):
     from acu_daemon.config.load import load_satellite, load_station
+    from acu_daemon.drivers.sa3842.codec import CommandDecoder, ReplyDecoder, encode_command, encode_reply
+    from acu_daemon.drivers.sa3842.exchange import HostExchange
+    from acu_daemon.drivers.sa3842.messages import AcuMode, Identify, Poll, Status
     from acu_daemon.edge.carry_over_file import read_carry_over
     from acu_daemon.edge.elements_file import load_elements
     from acu_daemon.edge.recording import read_readings
@@ -29,9 +32,6 @@ with atheris.instrument_imports(include=["acu_daemon"]):
     from acu_daemon.orbit.oem import parse_oem
     from acu_daemon.orbit.omm import parse_omm
     from acu_daemon.orbit.tle import parse_tle
-    from acu_daemon.protocol.exchange import HostExchange
-    from acu_daemon.protocol.messages import AcuMode, Identify, Poll, Status
-    from acu_daemon.protocol.sa3842 import CommandDecoder, ReplyDecoder, encode_command, encode_reply
     from acu_daemon.sim.scenario import read_scenario
 
 ROOT = Path(__file__).resolve().parents[1]

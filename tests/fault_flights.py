@@ -7,8 +7,8 @@ from functools import cache
 from flights import LSB_DEG, RISING_TAI_S, Script, climb, demo_target
 
 from acu_daemon.cli.virtual_pass import Flight
+from acu_daemon.drivers.sa3842.messages import WriteAndPoll, WriteRegisters
 from acu_daemon.edge.clock import LoopClock
-from acu_daemon.protocol.messages import WriteAndPoll, WriteRegisters
 from acu_daemon.units import wrap_180
 
 T = RISING_TAI_S

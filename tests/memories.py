@@ -5,8 +5,8 @@ from typing import Any
 
 from acu_daemon.control.safety.status_plausibility import Plausibility, judge
 from acu_daemon.control.state import ControlState
+from acu_daemon.drivers.sa3842.messages import Status
 from acu_daemon.model import AxisLimits
-from acu_daemon.protocol.messages import Status
 
 PART_OF = {
     field.name: part.name

@@ -11,8 +11,8 @@ import numpy as np
 
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Sky
+from acu_daemon.drivers.sa3842.messages import RegisterContents, Status, WriteAndPoll, WriteRegisters
 from acu_daemon.model import AxisLimits, FitResult, Prediction, Reading
-from acu_daemon.protocol.messages import RegisterContents, Status, WriteAndPoll, WriteRegisters
 
 
 @dataclass(frozen=True)

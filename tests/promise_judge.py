@@ -8,10 +8,7 @@ from flights import LSB_DEG
 
 from acu_daemon.daemon.service import FIRST_POLL_S, Outcome
 from acu_daemon.daemon.snapshot import Snapshot
-from acu_daemon.edge.carry_over_file import read_carry_over
-from acu_daemon.edge.run_state import read_run_state
-from acu_daemon.model import sky_angle_deg
-from acu_daemon.protocol.messages import (
+from acu_daemon.drivers.sa3842.messages import (
     Command,
     Poll,
     ReadRegisters,
@@ -22,6 +19,9 @@ from acu_daemon.protocol.messages import (
     WriteParameter,
     WriteRegisters,
 )
+from acu_daemon.edge.carry_over_file import read_carry_over
+from acu_daemon.edge.run_state import read_run_state
+from acu_daemon.model import sky_angle_deg
 from acu_daemon.sim.wire_log import RegisterWrite
 from acu_daemon.units import wrap_180
 

@@ -27,13 +27,13 @@ from acu_daemon.cli.options import Target, coming_pass
 from acu_daemon.cli.run import make_job
 from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.daemon.snapshot import Snapshot
+from acu_daemon.drivers.sa3842.codec import CommandDecoder, address_byte
+from acu_daemon.drivers.sa3842.messages import AcuMode, Command, SelectMode, Status, Stop, Stow
 from acu_daemon.edge.clock import LoopClock, SystemClock
 from acu_daemon.edge.fit import FitDiedError, InlineFitRunner
 from acu_daemon.edge.writer import replace_file
 from acu_daemon.errors import LinkError, NoAcuError
 from acu_daemon.model import Pass, Readings
-from acu_daemon.protocol.messages import AcuMode, Command, SelectMode, Status, Stop, Stow
-from acu_daemon.protocol.sa3842 import CommandDecoder, address_byte
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.acu_faults import break_acu
 from acu_daemon.sim.fault_board import FaultBoard

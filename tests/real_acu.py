@@ -5,7 +5,8 @@ import socket
 import threading
 from collections.abc import Iterator
 
-from acu_daemon.protocol.messages import (
+from acu_daemon.drivers.sa3842.codec import CommandDecoder, encode_reply
+from acu_daemon.drivers.sa3842.messages import (
     Ack,
     AcuMode,
     Command,
@@ -19,7 +20,6 @@ from acu_daemon.protocol.messages import (
     Reply,
     Status,
 )
-from acu_daemon.protocol.sa3842 import CommandDecoder, encode_reply
 
 STANDING = Status(az_deg=100.0, el_deg=40.0, mode=AcuMode.STANDBY)
 

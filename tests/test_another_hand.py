@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from promise_rig import HANDS, Rig, demo_scene
 
+from acu_daemon.drivers.sa3842.messages import Faults, Status
 from acu_daemon.edge.latch import DISARMED
 from acu_daemon.edge.run_state import RUN_STATE
-from acu_daemon.protocol.messages import Faults, Status
 from acu_daemon.sim import acu_status
 
 LOCK_S, OUTAGE_S = 8.0, 3.0

@@ -11,10 +11,10 @@ from flights import demo_target, sky_of
 
 from acu_daemon.cli.simulated import station_air
 from acu_daemon.config.antenna_tables import AtmosphereSection
+from acu_daemon.drivers.sa3842.messages import AcuMode, SelectMode
 from acu_daemon.model import sky_angle_deg
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 from acu_daemon.pointing.air import Air
-from acu_daemon.protocol.messages import AcuMode, SelectMode
 from acu_daemon.sim.apparent_sky import ApparentSky, make_air
 from acu_daemon.sim.build import StationAir, make_sky
 from acu_daemon.sim.mount_axes import MountAxes

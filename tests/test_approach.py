@@ -14,10 +14,10 @@ from acu_daemon.control.tracking.approach import longest_lead_s, way_s
 from acu_daemon.control.tracking.late_arrival import lateness
 from acu_daemon.control.tracking.register_limiter import CHASE_ACCELERATION_MARGIN, CHASE_RATE_MARGIN
 from acu_daemon.control.tracking.state_table import TrackState
+from acu_daemon.drivers.sa3842.messages import AcuMode
 from acu_daemon.model import AxisLimits
 from acu_daemon.orbit.look import look_at
 from acu_daemon.pointing.axis import AxisState, step
-from acu_daemon.protocol.messages import AcuMode
 from acu_daemon.sim.scenario import AcuChoice
 from acu_daemon.units import wrap_180
 

@@ -19,7 +19,7 @@ from flights import (
 
 from acu_daemon.cli.virtual_pass import Flight, ScriptAccess
 from acu_daemon.control.safety.command_permit import READS
-from acu_daemon.protocol.messages import (
+from acu_daemon.drivers.sa3842.messages import (
     AcuMode,
     Backup,
     Command,

@@ -17,9 +17,9 @@ from acu_daemon.control.safety.axis_watch import (
     watch_axis,
 )
 from acu_daemon.control.safety.encoder_watch import FROZEN_DEG, EncoderWatch, watch_encoders
+from acu_daemon.drivers.sa3842.messages import AcuMode, Backup, Status
 from acu_daemon.model import AxisLimits, Pointing
 from acu_daemon.pointing.axis import AxisState, step
-from acu_daemon.protocol.messages import AcuMode, Backup, Status
 
 LIMITS = AxisLimits(-270.0, 270.0, 20.0, 10.0)
 BOUNDS = Bounds(1.0, 2.0)

@@ -16,12 +16,8 @@ from config_files import BROUWER, STATION, from_file, replaced, write
 from test_live_line import SEEN
 
 from acu_daemon.cli import check, own_daemon
-from acu_daemon.edge.clock import SystemClock
-from acu_daemon.edge.control_socket import SOCKET
-from acu_daemon.edge.state_directory import SNAPSHOT, StateOwner, antenna_directory
-from acu_daemon.errors import AcuDaemonError
-from acu_daemon.orbit.timescales import tai_from_utc
-from acu_daemon.protocol.messages import (
+from acu_daemon.drivers.sa3842.codec import CMD_OF, CommandDecoder, encode_reply
+from acu_daemon.drivers.sa3842.messages import (
     AcuMode,
     Command,
     Faults,
@@ -33,8 +29,12 @@ from acu_daemon.protocol.messages import (
     Reply,
     Status,
 )
-from acu_daemon.protocol.sa3842 import CMD_OF, CommandDecoder, encode_reply
-from acu_daemon.protocol.status_block import decode_status
+from acu_daemon.drivers.sa3842.status_block import decode_status
+from acu_daemon.edge.clock import SystemClock
+from acu_daemon.edge.control_socket import SOCKET
+from acu_daemon.edge.state_directory import SNAPSHOT, StateOwner, antenna_directory
+from acu_daemon.errors import AcuDaemonError
+from acu_daemon.orbit.timescales import tai_from_utc
 
 READY = replace(
     decode_status("0" * 23), mode=AcuMode.STANDBY, is_remote_enabled=True, is_receiver_valid=True, agc_db=7.5

@@ -11,11 +11,11 @@ from waiting import Story, tell
 import acu_daemon.cli as cli
 from acu_daemon.cli.clock_wait import wait_for_clock
 from acu_daemon.cli.options import coming_pass, load_target
+from acu_daemon.drivers.sa3842.messages import Stop
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.clock_sense import before_elements, before_release
 from acu_daemon.errors import UsageError
 from acu_daemon.orbit.timescales import tai_from_utc
-from acu_daemon.protocol.messages import Stop
 
 DEMO = Path(cli.__file__).parent / "demo_config"
 RISE_TAI_S = coming_pass(load_target(DEMO, "demo-1", DEMO_TAI_S), DEMO_TAI_S).rise_tai_s

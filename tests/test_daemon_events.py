@@ -33,11 +33,7 @@ from acu_daemon.cli.virtual_pass import Flight, ScriptAccess
 from acu_daemon.config.tracking_tables import LEAST_LOW_WATER_S
 from acu_daemon.daemon.background import RETRY_S, fit_deadline_s
 from acu_daemon.daemon.live import live_text
-from acu_daemon.edge.clock import LoopClock
-from acu_daemon.edge.fit import START_S, FitDiedError, FitFailedError, InlineFitRunner
-from acu_daemon.errors import NoAcuError, UsageError
-from acu_daemon.model import Model
-from acu_daemon.protocol.messages import (
+from acu_daemon.drivers.sa3842.messages import (
     AcuMode,
     Command,
     Identify,
@@ -55,6 +51,10 @@ from acu_daemon.protocol.messages import (
     WriteParameter,
     WriteRegisters,
 )
+from acu_daemon.edge.clock import LoopClock
+from acu_daemon.edge.fit import START_S, FitDiedError, FitFailedError, InlineFitRunner
+from acu_daemon.errors import NoAcuError, UsageError
+from acu_daemon.model import Model
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.scenario import AcuChoice, SkyErrors
 

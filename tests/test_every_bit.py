@@ -5,9 +5,9 @@ from dataclasses import fields, replace
 import pytest
 from fake_sky import AZIMUTH, ELEVATION, START_TAI_S, Star
 
-from acu_daemon.protocol.messages import AcuMode, Backup, Faults, Status
-from acu_daemon.protocol.sa3842 import ReplyDecoder, ReplyEvent, encode_reply
-from acu_daemon.protocol.status_block import decode_status, encode_status
+from acu_daemon.drivers.sa3842.codec import ReplyDecoder, ReplyEvent, encode_reply
+from acu_daemon.drivers.sa3842.messages import AcuMode, Backup, Faults, Status
+from acu_daemon.drivers.sa3842.status_block import decode_status, encode_status
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.scenario import AcuChoice, Scenario

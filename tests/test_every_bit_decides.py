@@ -13,8 +13,8 @@ from acu_daemon.control.state import ControlState, Held, Sent
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Exchange, Observation, Sky, TickInput
 from acu_daemon.control.tracking.state_table import TrackState
+from acu_daemon.drivers.sa3842.messages import AcuMode, Backup, Faults, ReadFaults, Status
 from acu_daemon.model import AxisLimits, Prediction, Reading
-from acu_daemon.protocol.messages import AcuMode, Backup, Faults, ReadFaults, Status
 
 FLAGS = [field.name for field in fields(Status) if field.name.startswith(("is_", "are_", "has_"))]
 FAULT_FLAGS = ("has_azimuth_fault", "has_elevation_fault", "has_tilt_fault", "has_interlock_fault")

@@ -21,9 +21,9 @@ from acu_daemon.control.tracking.scan import DWELL_S, ON_PLACE_BEAMS, go_on, loo
 from acu_daemon.control.tracking.state_table import Cause, TrackState
 from acu_daemon.control.tracking.track_frame import beside, offset_of
 from acu_daemon.daemon.motion import Motion
+from acu_daemon.drivers.sa3842.messages import AcuMode, Backup, Status
 from acu_daemon.model import AxisLimits, Model, Pointing, Prediction, Reading
 from acu_daemon.pointing.axis import AxisState
-from acu_daemon.protocol.messages import AcuMode, Backup, Status
 from acu_daemon.units import Array, wrap_180
 
 ELEVATIONS_DEG = (2.0, 20.0, 40.0, 60.0, 75.0, 85.0, 89.0)

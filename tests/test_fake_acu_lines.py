@@ -8,12 +8,22 @@ from pathlib import Path
 import pytest
 from fake_sky import AZIMUTH, ELEVATION, START_TAI_S, Star
 
+from acu_daemon.drivers.sa3842.codec import encode_command
+from acu_daemon.drivers.sa3842.exchange import HostExchange
+from acu_daemon.drivers.sa3842.messages import (
+    Ack,
+    AcuMode,
+    Command,
+    Identify,
+    Poll,
+    Reply,
+    SelectMode,
+    Status,
+    WriteAndPoll,
+)
 from acu_daemon.edge.clock import LoopClock, SystemClock
 from acu_daemon.edge.link import Link, make_link
 from acu_daemon.errors import LinkError, LinkRefusedError, UsageError
-from acu_daemon.protocol.exchange import HostExchange
-from acu_daemon.protocol.messages import Ack, AcuMode, Command, Identify, Poll, Reply, SelectMode, Status, WriteAndPoll
-from acu_daemon.protocol.sa3842 import encode_command
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.fault_board import FaultBoard
 from acu_daemon.sim.line import AcuLine

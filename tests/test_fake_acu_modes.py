@@ -3,8 +3,7 @@
 import pytest
 from fake_sky import Bench, Star
 
-from acu_daemon.model import AxisLimits
-from acu_daemon.protocol.messages import (
+from acu_daemon.drivers.sa3842.messages import (
     Ack,
     AcuMode,
     Backup,
@@ -30,6 +29,7 @@ from acu_daemon.protocol.messages import (
     WriteParameter,
     WriteRegisters,
 )
+from acu_daemon.model import AxisLimits
 from acu_daemon.sim.faults import FaultNibble
 from acu_daemon.sim.scenario import AcuChoice, Encoder, Loss, Scenario, StartMode
 

@@ -9,8 +9,7 @@ from fake_sky import AZIMUTH, ELEVATION, START_TAI_S, Bench, Star
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acu_daemon.model import AxisLimits, sky_angle_deg
-from acu_daemon.protocol.messages import (
+from acu_daemon.drivers.sa3842.messages import (
     Ack,
     AcuMode,
     Backup,
@@ -21,6 +20,7 @@ from acu_daemon.protocol.messages import (
     WriteParameter,
     WriteRegisters,
 )
+from acu_daemon.model import AxisLimits, sky_angle_deg
 from acu_daemon.sim.command_registers import choose_turn, turns_within
 from acu_daemon.sim.pedestal import STEP_S, Axis, Follower
 from acu_daemon.sim.receiver import offset_in_beam

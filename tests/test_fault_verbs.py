@@ -8,10 +8,10 @@ from typing import get_args
 
 import pytest
 
+from acu_daemon.drivers.sa3842.codec import ReplyDecoder, encode_command, encode_reply
+from acu_daemon.drivers.sa3842.frame import NAK
+from acu_daemon.drivers.sa3842.messages import Ack, AcuMode, Backup, Garbled, Nak, Poll, Status
 from acu_daemon.errors import ConfigError
-from acu_daemon.protocol.frame import NAK
-from acu_daemon.protocol.messages import Ack, AcuMode, Backup, Garbled, Nak, Poll, Status
-from acu_daemon.protocol.sa3842 import ReplyDecoder, encode_command, encode_reply
 from acu_daemon.sim.fault_board import FaultBoard
 from acu_daemon.sim.fault_verbs import (
     VERBS,

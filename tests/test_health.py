@@ -7,7 +7,7 @@ from test_live_line import SEEN
 
 from acu_daemon.daemon.health import FEED_S, Health
 from acu_daemon.daemon.snapshot import Snapshot
-from acu_daemon.protocol.messages import Command, Identity, ReadParameter, Reply, WriteAndPoll, WriteParameter
+from acu_daemon.drivers.sa3842.messages import Command, Identity, ReadParameter, Reply, WriteAndPoll, WriteParameter
 from acu_daemon.sim.acu import FakeAcu
 
 ALIVE = "WATCHDOG=1"

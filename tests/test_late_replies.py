@@ -14,10 +14,8 @@ from hypothesis import strategies as st
 from acu_daemon.assist.session.refit import RefitReply, RefitRequest
 from acu_daemon.cli.virtual_pass import Flight
 from acu_daemon.daemon.port import AcuPort, Answer
-from acu_daemon.edge.arrivals import Arrivals
-from acu_daemon.edge.clock import LoopClock
-from acu_daemon.edge.fit import InlineFitRunner
-from acu_daemon.protocol.messages import (
+from acu_daemon.drivers.sa3842.codec import CMD_OF, DEFAULT_ADDRESS, CommandDecoder, encode_reply
+from acu_daemon.drivers.sa3842.messages import (
     Command,
     Identify,
     Identity,
@@ -27,8 +25,10 @@ from acu_daemon.protocol.messages import (
     Status,
     WriteAndPoll,
 )
-from acu_daemon.protocol.sa3842 import CMD_OF, DEFAULT_ADDRESS, CommandDecoder, encode_reply
-from acu_daemon.protocol.status_block import decode_status
+from acu_daemon.drivers.sa3842.status_block import decode_status
+from acu_daemon.edge.arrivals import Arrivals
+from acu_daemon.edge.clock import LoopClock
+from acu_daemon.edge.fit import InlineFitRunner
 from acu_daemon.sim.virtual import run_virtual
 
 T = RISING_TAI_S

@@ -17,8 +17,8 @@ from acu_daemon.cli.latency_test import _link, fits, histogram
 from acu_daemon.config.load import load_station
 from acu_daemon.daemon.latency_trial import Trial
 from acu_daemon.daemon.tick_lateness import Lateness
+from acu_daemon.drivers.sa3842.messages import Identify, Poll
 from acu_daemon.edge.link import make_link
-from acu_daemon.protocol.messages import Identify, Poll
 
 realtime = pytest.mark.realtime
 PATIENCE_S = 60.0

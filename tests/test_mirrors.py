@@ -12,8 +12,8 @@ from acu_daemon.control.orders import Orders
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import TickInput
-from acu_daemon.protocol.angles import LSB_DEG
-from acu_daemon.protocol.messages import Command, WriteAndPoll, WriteRegisters
+from acu_daemon.drivers.sa3842.angles import LSB_DEG
+from acu_daemon.drivers.sa3842.messages import Command, WriteAndPoll, WriteRegisters
 
 SEEDS = range(24)
 TICKS = 300

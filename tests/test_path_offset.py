@@ -17,9 +17,9 @@ from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Sky, TickInput
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.control.tracking.track_frame import beside, extents, offset_of
+from acu_daemon.drivers.sa3842.messages import AcuMode, WriteAndPoll
 from acu_daemon.model import Model, Prediction, sky_angle_deg
 from acu_daemon.orbit.look import look_at
-from acu_daemon.protocol.messages import AcuMode, WriteAndPoll
 from acu_daemon.sim.scenario import SkyErrors
 from acu_daemon.sim.sky import DelayedPropagator
 

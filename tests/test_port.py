@@ -8,10 +8,10 @@ from fake_sky import AZIMUTH, ELEVATION, START_TAI_S, Star
 
 from acu_daemon.daemon.port import EXCHANGE_DEADLINE_S, FIRST_POLL_S, AcuPort
 from acu_daemon.daemon.stopping import DEADLINE_S, stop_antenna
+from acu_daemon.drivers.sa3842.codec import DEFAULT_ADDRESS
+from acu_daemon.drivers.sa3842.messages import Ack, AcuMode, Nak, Poll, SelectMode, Status, Stow, WriteAndPoll
 from acu_daemon.edge.clock import LoopClock
 from acu_daemon.errors import LinkError
-from acu_daemon.protocol.messages import Ack, AcuMode, Nak, Poll, SelectMode, Status, Stow, WriteAndPoll
-from acu_daemon.protocol.sa3842 import DEFAULT_ADDRESS
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.memory import MemoryLink
 from acu_daemon.sim.parts import AcuParts

@@ -6,10 +6,27 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acu_daemon.protocol.angles import azimuth_code, azimuth_deg, clamp_code, clamp_deg, elevation_code, elevation_deg
-from acu_daemon.protocol.exchange import HostExchange
-from acu_daemon.protocol.frame import ACK, MAX_DATA_BYTES, NAK, STX, BadFrame, Frame, FrameDecoder, encode_frame
-from acu_daemon.protocol.messages import (
+from acu_daemon.drivers.sa3842.angles import (
+    azimuth_code,
+    azimuth_deg,
+    clamp_code,
+    clamp_deg,
+    elevation_code,
+    elevation_deg,
+)
+from acu_daemon.drivers.sa3842.codec import (
+    CommandDecoder,
+    CommandEvent,
+    ReplyDecoder,
+    address_byte,
+    cycle_s,
+    encode_command,
+    encode_reply,
+    exchange_bytes,
+)
+from acu_daemon.drivers.sa3842.exchange import HostExchange
+from acu_daemon.drivers.sa3842.frame import ACK, MAX_DATA_BYTES, NAK, STX, BadFrame, Frame, FrameDecoder, encode_frame
+from acu_daemon.drivers.sa3842.messages import (
     Ack,
     AcuMode,
     Backup,
@@ -30,16 +47,6 @@ from acu_daemon.protocol.messages import (
     WriteAndPoll,
     WriteParameter,
     WriteRegisters,
-)
-from acu_daemon.protocol.sa3842 import (
-    CommandDecoder,
-    CommandEvent,
-    ReplyDecoder,
-    address_byte,
-    cycle_s,
-    encode_command,
-    encode_reply,
-    exchange_bytes,
 )
 
 LSB_DEG = 360 / 65536

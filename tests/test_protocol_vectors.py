@@ -6,7 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from acu_daemon.protocol.messages import (
+from acu_daemon.drivers.sa3842.codec import (
+    CommandDecoder,
+    CommandEvent,
+    ReplyDecoder,
+    ReplyEvent,
+    encode_command,
+    encode_reply,
+)
+from acu_daemon.drivers.sa3842.messages import (
     Ack,
     AcuMode,
     Backup,
@@ -32,14 +40,6 @@ from acu_daemon.protocol.messages import (
     WriteAndPoll,
     WriteParameter,
     WriteRegisters,
-)
-from acu_daemon.protocol.sa3842 import (
-    CommandDecoder,
-    CommandEvent,
-    ReplyDecoder,
-    ReplyEvent,
-    encode_command,
-    encode_reply,
 )
 
 VECTORS = json.loads((Path(__file__).parents[1] / "docs" / "sa3842-vectors.json").read_text())

@@ -19,8 +19,7 @@ from acu_daemon.control.state import ControlState, StartStage, Watchdog
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Sky, TickInput
 from acu_daemon.control.tracking.state_table import TrackState
-from acu_daemon.model import Correction, FitResult, Pointing, Prediction, Reading
-from acu_daemon.protocol.messages import (
+from acu_daemon.drivers.sa3842.messages import (
     Ack,
     AcuMode,
     Backup,
@@ -38,6 +37,7 @@ from acu_daemon.protocol.messages import (
     WriteAndPoll,
     WriteRegisters,
 )
+from acu_daemon.model import Correction, FitResult, Pointing, Prediction, Reading
 
 CONFIG = ControlConfig(AZIMUTH, ELEVATION)
 NOW, PERIOD_S = 8.4e8, 0.1

@@ -12,9 +12,9 @@ from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.intake import RATE_READINGS
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tracking.register_limiter import limit
+from acu_daemon.drivers.sa3842.messages import AcuMode, Status
 from acu_daemon.model import AxisLimits, Pointing
 from acu_daemon.pointing.axis import AxisState
-from acu_daemon.protocol.messages import AcuMode, Status
 
 CONFIG = ControlConfig(AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0))
 DT_S = 0.1

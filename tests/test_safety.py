@@ -15,7 +15,7 @@ from acu_daemon.control.state import ControlState, Held, StartStage, Watchdog
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Exchange, Observation, Request, Sky, TickInput
 from acu_daemon.control.tracking.state_table import ACTIVE, TrackState
-from acu_daemon.protocol.messages import (
+from acu_daemon.drivers.sa3842.messages import (
     Ack,
     AcuMode,
     Backup,

@@ -10,9 +10,8 @@ from acu_daemon.control.safety.arming import last_command
 from acu_daemon.control.startup import after_reply, next_command
 from acu_daemon.control.state import ControlState, StartStage
 from acu_daemon.control.tick_input import Exchange
-from acu_daemon.model import AxisLimits
-from acu_daemon.protocol.angles import LSB_DEG
-from acu_daemon.protocol.messages import (
+from acu_daemon.drivers.sa3842.angles import LSB_DEG
+from acu_daemon.drivers.sa3842.messages import (
     Ack,
     AcuMode,
     Command,
@@ -29,7 +28,8 @@ from acu_daemon.protocol.messages import (
     WriteParameter,
     WriteRegisters,
 )
-from acu_daemon.protocol.status_block import decode_status
+from acu_daemon.drivers.sa3842.status_block import decode_status
+from acu_daemon.model import AxisLimits
 
 CONFIG = ControlConfig(AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0))
 AZ_DEG, EL_DEG = 22464 * LSB_DEG, 10322 * LSB_DEG  # angles an encoder can show, near 123.4 and 56.7

@@ -21,7 +21,7 @@ from memories import Judge
 from promise_rig import Rig, demo_scene
 
 from acu_daemon.control.safety.status_plausibility import contradictions
-from acu_daemon.protocol.messages import AcuMode, Backup, Command, SelectBackup, SelectMode, Status, Stow
+from acu_daemon.drivers.sa3842.messages import AcuMode, Backup, Command, SelectBackup, SelectMode, Status, Stow
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.scenario import AcuChoice, Scenario

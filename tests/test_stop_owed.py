@@ -15,8 +15,8 @@ from acu_daemon.control.safety.command_permit import READS
 from acu_daemon.control.state import ControlState, StartStage, Watchdog
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Exchange, Observation, Request, TickInput
+from acu_daemon.drivers.sa3842.messages import AcuMode, Command, Nak, Reply, Status, Stop, WriteParameter
 from acu_daemon.pointing.axis import AxisState
-from acu_daemon.protocol.messages import AcuMode, Command, Nak, Reply, Status, Stop, WriteParameter
 
 T = RISING_TAI_S
 SILENT_S = 9.0

@@ -19,10 +19,8 @@ from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Sky, 
 from acu_daemon.control.tracking.causes import LINK_SILENCE_S
 from acu_daemon.control.tracking.lag import LagEstimate
 from acu_daemon.control.tracking.state_table import ACTIVE, TrackState
-from acu_daemon.model import AxisLimits, Prediction, Reading
-from acu_daemon.pointing.axis import AxisState
-from acu_daemon.protocol.angles import LSB_DEG
-from acu_daemon.protocol.messages import (
+from acu_daemon.drivers.sa3842.angles import LSB_DEG
+from acu_daemon.drivers.sa3842.messages import (
     AcuMode,
     Backup,
     Command,
@@ -40,6 +38,8 @@ from acu_daemon.protocol.messages import (
     WriteAndPoll,
     WriteRegisters,
 )
+from acu_daemon.model import AxisLimits, Prediction, Reading
+from acu_daemon.pointing.axis import AxisState
 
 CONFIG = ControlConfig(AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0))
 NOW = 8.4e8

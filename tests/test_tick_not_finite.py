@@ -19,10 +19,10 @@ from acu_daemon.control.state import ControlState, PathOffset, StartStage
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Observation, Sky, TickInput
 from acu_daemon.control.tracking.state_table import TrackState
+from acu_daemon.drivers.sa3842.messages import AcuMode, WriteAndPoll, WriteRegisters
 from acu_daemon.edge.fit import InlineFitRunner
 from acu_daemon.model import Correction, FitResult, Model
 from acu_daemon.pointing.axis import AxisState
-from acu_daemon.protocol.messages import AcuMode, WriteAndPoll, WriteRegisters
 
 FIT = FitResult("full", Correction(), NOW - 5.0, 40, 0, 0.02, 0.5, 0.01)
 SIGMA = np.full(FITTED.prediction.az_deg.size, 0.01)

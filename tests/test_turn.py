@@ -23,8 +23,8 @@ from acu_daemon.control.safety.turn import (
     watch_goal,
     watch_pull,
 )
+from acu_daemon.drivers.sa3842.messages import AcuMode, Status
 from acu_daemon.model import AxisLimits
-from acu_daemon.protocol.messages import AcuMode, Status
 
 WRAP = AxisLimits(-270.0, 270.0, 20.0, 10.0)
 ONE_TURN = AxisLimits(0.0, 360.0, 20.0, 10.0)

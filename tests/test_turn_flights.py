@@ -20,8 +20,7 @@ from flights import (
 )
 
 from acu_daemon.cli.virtual_pass import Flight
-from acu_daemon.pointing.wrap import nearest_turn
-from acu_daemon.protocol.messages import (
+from acu_daemon.drivers.sa3842.messages import (
     AcuMode,
     Command,
     Nak,
@@ -32,6 +31,7 @@ from acu_daemon.protocol.messages import (
     WriteAndPoll,
     WriteRegisters,
 )
+from acu_daemon.pointing.wrap import nearest_turn
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.scenario import AcuChoice
 from acu_daemon.units import wrap_180

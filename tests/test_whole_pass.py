@@ -26,11 +26,11 @@ from real_pass import truth_path, truth_span, write_config
 
 from acu_daemon.cli.options import Target, load_target
 from acu_daemon.cli.virtual_pass import Flight, fly
+from acu_daemon.drivers.sa3842.messages import Stop, WriteAndPoll, WriteParameter
 from acu_daemon.model import sky_angle_deg
 from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.pointing.keyhole import follow_path
-from acu_daemon.protocol.messages import Stop, WriteAndPoll, WriteParameter
 from acu_daemon.sim.scenario import AcuChoice, Encoder, Scenario, SkyErrors
 from acu_daemon.sim.sky import read_truth
 

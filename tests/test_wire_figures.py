@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from fake_sky import AZIMUTH, ELEVATION, START_TAI_S, Bench
 
+from acu_daemon.drivers.sa3842.messages import Ack, AcuMode, Nak, SelectMode, WriteAndPoll, WriteRegisters
 from acu_daemon.errors import UsageError
-from acu_daemon.protocol.messages import Ack, AcuMode, Nak, SelectMode, WriteAndPoll, WriteRegisters
 from acu_daemon.report.pass_trace import Trace
 from acu_daemon.report.wire import (
     HALF_SERVO_TICK_S,

@@ -15,8 +15,8 @@ from acu_daemon.control.orders import Orders
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Request, Sky, TickInput
+from acu_daemon.drivers.sa3842.messages import AcuMode, Nak, SelectMode, Status, Stop, Stow
 from acu_daemon.model import AxisLimits, Correction, FitResult, Model, Prediction, Reading
-from acu_daemon.protocol.messages import AcuMode, Nak, SelectMode, Status, Stop, Stow
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.scenario import AcuChoice, Encoder, Scenario

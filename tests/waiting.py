@@ -21,11 +21,11 @@ from acu_daemon.control.state import ControlState
 from acu_daemon.daemon.runs import Runs
 from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.daemon.snapshot import Snapshot
+from acu_daemon.drivers.sa3842.codec import CommandEvent
+from acu_daemon.drivers.sa3842.messages import Command
 from acu_daemon.edge.clock import LoopClock, SystemClock
 from acu_daemon.edge.fit import InlineFitRunner
 from acu_daemon.errors import UsageError
-from acu_daemon.protocol.messages import Command
-from acu_daemon.protocol.sa3842 import CommandEvent
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.memory import MemoryLink
 from acu_daemon.sim.parts import AcuParts

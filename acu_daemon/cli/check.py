@@ -34,6 +34,8 @@ from acu_daemon.control.tracking.pass_plan import plan_pass
 from acu_daemon.daemon.health import status_line
 from acu_daemon.daemon.port import AcuPort
 from acu_daemon.daemon.verdict import Level, alarms, verdict
+from acu_daemon.drivers.sa3842.codec import address_byte
+from acu_daemon.drivers.sa3842.messages import AcuMode, Faults, Identify, Identity, ReadFaults, Reply, Status
 from acu_daemon.edge.clock import SystemClock, is_clock_synchronised, system_tai_s
 from acu_daemon.edge.clock_sense import before_elements, before_release
 from acu_daemon.edge.earth_orientation_file import at_date
@@ -49,8 +51,6 @@ from acu_daemon.orbit.sun import RISEN_EL_DEG, sun_direction_deg
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.orbit.visibility import why_none
 from acu_daemon.pointing.wrap import middle_deg
-from acu_daemon.protocol.messages import AcuMode, Faults, Identify, Identity, ReadFaults, Reply, Status
-from acu_daemon.protocol.sa3842 import address_byte
 from acu_daemon.units import DAY_S, wrap_180
 
 ACU_S = 3.0  # for all that is asked of it: a reply or two may be lost

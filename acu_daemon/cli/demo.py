@@ -23,6 +23,8 @@ from acu_daemon.daemon.live import LiveLine
 from acu_daemon.daemon.port import AcuPort
 from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.daemon.snapshot import Snapshot
+from acu_daemon.drivers.sa3842.codec import DEFAULT_ADDRESS
+from acu_daemon.drivers.sa3842.messages import AcuMode, Backup, SelectBackup, SelectMode
 from acu_daemon.edge.child_process import start_python
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.event_loop import run_loop
@@ -34,8 +36,6 @@ from acu_daemon.edge.signals import take_signals
 from acu_daemon.errors import AcuDaemonError, UsageError
 from acu_daemon.model import sky_angle_deg
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
-from acu_daemon.protocol.messages import AcuMode, Backup, SelectBackup, SelectMode
-from acu_daemon.protocol.sa3842 import DEFAULT_ADDRESS
 from acu_daemon.report.pass_trace import Figures, measure, read_trace
 from acu_daemon.sim.build import make_sky
 from acu_daemon.sim.scenario import Loss, Scenario, read_scenario

@@ -11,12 +11,12 @@ from acu_daemon.cli.rehearsal import clock_text, meet_in_rehearsal
 from acu_daemon.cli.serving import Control, Place, parse_place, serve_until_stopped
 from acu_daemon.cli.simulated import station_air
 from acu_daemon.config.load import load_station
+from acu_daemon.drivers.sa3842.codec import address_byte
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.event_loop import run_loop
 from acu_daemon.edge.link import BITS_PER_CHARACTER, DEFAULT_BAUD, make_link
 from acu_daemon.edge.rehearsal_clock import Meeting, Role
 from acu_daemon.errors import UsageError
-from acu_daemon.protocol.sa3842 import address_byte
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.acu_faults import break_acu
 from acu_daemon.sim.build import build_fake_acu

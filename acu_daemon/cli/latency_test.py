@@ -19,6 +19,8 @@ from acu_daemon.config.load import load_station
 from acu_daemon.config.station_tables import StationFile
 from acu_daemon.daemon.latency_trial import Trial, try_loop
 from acu_daemon.daemon.port import CYCLE_SHARE, LONGEST_EXTRA, AcuPort
+from acu_daemon.drivers.sa3842.codec import address_byte, cycle_s, exchange_bytes
+from acu_daemon.drivers.sa3842.messages import Poll, WriteAndPoll
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.event_loop import run_loop
 from acu_daemon.edge.fit import ProcessFitRunner
@@ -27,8 +29,6 @@ from acu_daemon.edge.scheduling import keep_to_this_thread, may_be_real_time
 from acu_daemon.errors import UsageError
 from acu_daemon.model import Pass, Readings
 from acu_daemon.orbit.look import look_at
-from acu_daemon.protocol.messages import Poll, WriteAndPoll
-from acu_daemon.protocol.sa3842 import address_byte, cycle_s, exchange_bytes
 
 SKIP = "SKIP"
 PERIOD_S = 0.1

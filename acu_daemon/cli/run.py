@@ -46,6 +46,7 @@ from acu_daemon.daemon.live import LiveLine
 from acu_daemon.daemon.runs import Runs
 from acu_daemon.daemon.service import Outcome, PassJob, Service
 from acu_daemon.daemon.snapshot import Snapshot
+from acu_daemon.drivers.sa3842.codec import address_byte
 from acu_daemon.edge.clock import STEP_S, SystemClock
 from acu_daemon.edge.control_socket import ControlSocket
 from acu_daemon.edge.denied import denied
@@ -63,7 +64,6 @@ from acu_daemon.edge.writer import QueuedStream, Writer
 from acu_daemon.errors import AcuDaemonError
 from acu_daemon.model import Pass
 from acu_daemon.orbit.timescales import utc_text
-from acu_daemon.protocol.sa3842 import address_byte
 from acu_daemon.units import DAY_S
 
 STDERR = 2

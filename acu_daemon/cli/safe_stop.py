@@ -14,12 +14,12 @@ from acu_daemon.config.load import load_station
 from acu_daemon.config.station_tables import StationFile
 from acu_daemon.daemon.port import AcuPort
 from acu_daemon.daemon.stopping import DEADLINE_S, stop_antenna
+from acu_daemon.drivers.sa3842.codec import address_byte
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.event_loop import run_loop
 from acu_daemon.edge.link import make_link
 from acu_daemon.edge.logs import configure_logs
 from acu_daemon.errors import NoAcuError
-from acu_daemon.protocol.sa3842 import address_byte
 
 NOT_RESTARTED = "2"  # RestartPreventExitStatus= of the unit: a refused configuration
 FINAL = "final"  # the file in $RUNTIME_DIRECTORY that says: this stop was asked for, nothing starts again after it

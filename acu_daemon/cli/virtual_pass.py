@@ -17,10 +17,10 @@ from acu_daemon.cli.run import make_job
 from acu_daemon.cli.simulated import station_air
 from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.daemon.snapshot import Snapshot
+from acu_daemon.drivers.sa3842.codec import CommandDecoder, address_byte
+from acu_daemon.drivers.sa3842.messages import Command
 from acu_daemon.edge.clock import LoopClock
 from acu_daemon.edge.fit import FitRunner, InlineFitRunner
-from acu_daemon.protocol.messages import Command
-from acu_daemon.protocol.sa3842 import CommandDecoder, address_byte
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.acu_faults import break_acu
 from acu_daemon.sim.build import make_sky

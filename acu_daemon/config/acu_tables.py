@@ -5,10 +5,10 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from acu_daemon.config.section import Section
+from acu_daemon.drivers.sa3842.codec import address_byte
 from acu_daemon.edge.link import make_link
 from acu_daemon.errors import UsageError
 from acu_daemon.model import AxisLimits
-from acu_daemon.protocol.sa3842 import address_byte
 
 
 class AxisSection(Section):

@@ -13,7 +13,7 @@ from acu_daemon.control.state import ControlState, StartStage
 from acu_daemon.control.tick_input import Exchange
 from acu_daemon.control.tracking.causes import LINK_SILENCE_S
 from acu_daemon.control.tracking.mode_selection import wanted_mode_command
-from acu_daemon.protocol.messages import Command, Nak, Stop
+from acu_daemon.drivers.sa3842.messages import Command, Nak, Stop
 
 EXTRA_REPEAT_S = 0.3  # a command gets this long to show in the status before it is sent again
 EXTRA_SETTLED_S = 0.7  # after that; a status that still contradicts itself means it

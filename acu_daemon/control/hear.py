@@ -13,8 +13,8 @@ from acu_daemon.control.state import ControlState, Fitting
 from acu_daemon.control.tick_input import Arrival, Exchange, Observation
 from acu_daemon.control.tracking.causes import is_acquired
 from acu_daemon.control.tracking.state_table import AUTOTRACKING
+from acu_daemon.drivers.sa3842.messages import Nak, Poll, Status, WriteAndPoll
 from acu_daemon.model import Reading
-from acu_daemon.protocol.messages import Nak, Poll, Status, WriteAndPoll
 
 ROUNDING_S = 1e-6  # of differences of TAI
 

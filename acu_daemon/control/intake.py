@@ -8,8 +8,8 @@ from acu_daemon.control.state import ControlState, Intake
 from acu_daemon.control.tick_input import Observation, Sky
 from acu_daemon.control.tracking.causes import is_acquired
 from acu_daemon.control.tracking.state_table import AUTOTRACKING
+from acu_daemon.drivers.sa3842.messages import AcuMode, Status
 from acu_daemon.model import Reading
-from acu_daemon.protocol.messages import AcuMode, Status
 
 RATE_READINGS = 6  # the rate of an axis is taken over this many readings: near the zenith one pair is all noise
 

@@ -11,8 +11,8 @@ from acu_daemon.control.orders import Event
 from acu_daemon.control.state import ControlState, Sent
 from acu_daemon.control.tick_input import Observation
 from acu_daemon.control.tracking.register_limiter import Passed, limit, within_limits
+from acu_daemon.drivers.sa3842.messages import WriteAndPoll
 from acu_daemon.model import Pointing
-from acu_daemon.protocol.messages import WriteAndPoll
 
 REFUSED_PAUSE_S = 1.0  # a write that is refused again within REFUSED_AGAIN_S waits this long
 REFUSED_AGAIN_S = 2.0

@@ -13,8 +13,8 @@ from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.orders import Event
 from acu_daemon.control.state import ControlState, StartStage, Startup, Watchdog
 from acu_daemon.control.tick_input import Exchange
-from acu_daemon.protocol.angles import LSB_DEG, clamp_deg
-from acu_daemon.protocol.messages import (
+from acu_daemon.drivers.sa3842.angles import LSB_DEG, clamp_deg
+from acu_daemon.drivers.sa3842.messages import (
     Ack,
     Backup,
     Command,

@@ -16,9 +16,9 @@ from acu_daemon.control.safety.status_plausibility import Plausibility
 from acu_daemon.control.safety.turn import TurnWatch
 from acu_daemon.control.tracking.lag import LagEstimate
 from acu_daemon.control.tracking.state_table import TrackState
+from acu_daemon.drivers.sa3842.messages import Command, Identity, Status
 from acu_daemon.model import Model, Reading
 from acu_daemon.pointing.axis import AxisState
-from acu_daemon.protocol.messages import Command, Identity, Status
 
 
 class Watchdog(IntEnum):

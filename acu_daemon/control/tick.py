@@ -34,7 +34,7 @@ from acu_daemon.control.tracking.path_offset import drop_unusable_offset, forget
 from acu_daemon.control.tracking.search import search
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.control.tracking.walk import walk
-from acu_daemon.protocol.messages import Poll
+from acu_daemon.drivers.sa3842.messages import Poll
 
 
 def tick(state: ControlState, given: TickInput, config: ControlConfig) -> tuple[ControlState, Orders]:

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+from acu_daemon.drivers.sa3842.messages import Command, Nak, Reply, Status
 from acu_daemon.model import FitResult, Prediction, Reading
 from acu_daemon.pointing.reach import OutOfReach
-from acu_daemon.protocol.messages import Command, Nak, Reply, Status
 
 
 class Request(StrEnum):

@@ -22,9 +22,7 @@ from acu_daemon.daemon.motion import Motion
 from acu_daemon.daemon.port import AcuPort, Answer
 from acu_daemon.daemon.stopping import DEADLINE_S, stop_antenna
 from acu_daemon.daemon.tick_lateness import Lateness
-from acu_daemon.edge.clock import Clock
-from acu_daemon.model import Reading
-from acu_daemon.protocol.messages import (
+from acu_daemon.drivers.sa3842.messages import (
     Ack,
     Command,
     Faults,
@@ -39,6 +37,8 @@ from acu_daemon.protocol.messages import (
     WriteRegisters,
     command_text,
 )
+from acu_daemon.edge.clock import Clock
+from acu_daemon.model import Reading
 
 DOUBT_EVERY_S = 1.0
 LATE_SHARE = 0.5  # of the period: after a tick that began later than this the next one is skipped

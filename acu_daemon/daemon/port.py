@@ -10,12 +10,12 @@ from typing import Any
 import structlog
 
 from acu_daemon.control.tracking.causes import LINK_SILENCE_S
+from acu_daemon.drivers.sa3842.codec import exchange_bytes, reply_bytes
+from acu_daemon.drivers.sa3842.exchange import HostExchange
+from acu_daemon.drivers.sa3842.messages import Command, Identity, Poll, Reply, Status, WriteAndPoll
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.link import Link, open_once
 from acu_daemon.errors import LinkError
-from acu_daemon.protocol.exchange import HostExchange
-from acu_daemon.protocol.messages import Command, Identity, Poll, Reply, Status, WriteAndPoll
-from acu_daemon.protocol.sa3842 import exchange_bytes, reply_bytes
 
 EXCHANGE_DEADLINE_S = 0.090  # a reply is complete within this of the start of the write: docs/protocol.md, Link
 CYCLE_SHARE = 0.95  # of the period, for a write and an exchange beside it: docs/protocol.md, Timing

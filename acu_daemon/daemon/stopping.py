@@ -8,7 +8,7 @@ import structlog
 from acu_daemon.control.safety.arming import NO_STOP_MODES
 from acu_daemon.control.startup import WATCHDOG
 from acu_daemon.daemon.port import AcuPort
-from acu_daemon.protocol.messages import Ack, Status, Stop, WriteParameter
+from acu_daemon.drivers.sa3842.messages import Ack, Status, Stop, WriteParameter
 
 DEADLINE_S = 5.0  # a link that is down may come back; the service's TimeoutStopSec is longer
 REPEAT_S = 0.1

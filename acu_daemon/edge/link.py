@@ -6,11 +6,11 @@ from collections.abc import Callable
 from typing import Protocol
 from urllib.parse import SplitResult, parse_qsl, urlsplit
 
+from acu_daemon.drivers.sa3842.codec import cycle_s, exchange_bytes
+from acu_daemon.drivers.sa3842.messages import WriteAndPoll
 from acu_daemon.edge.serial_port import CHARACTER_FORMATS, SerialLink
 from acu_daemon.edge.tcp import TcpLink
 from acu_daemon.errors import LinkError, UsageError
-from acu_daemon.protocol.messages import WriteAndPoll
-from acu_daemon.protocol.sa3842 import cycle_s, exchange_bytes
 
 BITS_PER_CHARACTER = 10  # start, 8N1 or 7E1, stop
 DEFAULT_BAUD = 9600

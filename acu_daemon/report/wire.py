@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from acu_daemon.drivers.sa3842.angles import LSB_DEG
 from acu_daemon.model import AxisLimits, sky_angle_deg
 from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.pointing.axis import AxisState, step
-from acu_daemon.protocol.angles import LSB_DEG
 from acu_daemon.report.pass_trace import Trace
 from acu_daemon.units import Array, wrap_180
 

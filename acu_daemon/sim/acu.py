@@ -6,8 +6,9 @@ Angles are in the encoder frame, azimuth continuous.
 
 from collections.abc import Callable
 
-from acu_daemon.protocol.angles import elevation_deg
-from acu_daemon.protocol.messages import (
+from acu_daemon.drivers.sa3842.angles import elevation_deg
+from acu_daemon.drivers.sa3842.codec import CommandEvent, encode_reply
+from acu_daemon.drivers.sa3842.messages import (
     Ack,
     AcuMode,
     ClearChange,
@@ -32,7 +33,6 @@ from acu_daemon.protocol.messages import (
     WriteParameter,
     WriteRegisters,
 )
-from acu_daemon.protocol.sa3842 import CommandEvent, encode_reply
 from acu_daemon.sim.acu_modes import Modes
 from acu_daemon.sim.acu_status import flags_of, status_of
 from acu_daemon.sim.antenna import TILT, SimulatedAntenna

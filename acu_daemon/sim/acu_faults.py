@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from math import inf
 
+from acu_daemon.drivers.sa3842.messages import ResetFault
 from acu_daemon.edge.clock import Clock
-from acu_daemon.protocol.messages import ResetFault
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.fault_board import FaultBoard
 from acu_daemon.sim.fault_verbs import VERBS, Fault, VerbName

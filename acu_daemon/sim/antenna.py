@@ -10,8 +10,8 @@ from enum import Enum, auto
 from math import cos, radians
 from random import Random
 
+from acu_daemon.drivers.sa3842.angles import elevation_code, elevation_deg
 from acu_daemon.model import AxisLimits
-from acu_daemon.protocol.angles import elevation_code, elevation_deg
 from acu_daemon.sim.autotrack import Autotrack
 from acu_daemon.sim.command_registers import choose_turn
 from acu_daemon.sim.mount_axes import MountAxes

@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 from math import radians
 from pathlib import Path
 
+from acu_daemon.drivers.sa3842.codec import DEFAULT_ADDRESS
 from acu_daemon.model import AxisLimits, Correction, Site
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.pointing.air import Air
-from acu_daemon.protocol.sa3842 import DEFAULT_ADDRESS
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.apparent_sky import LOWEST_GEOMETRIC_EL_DEG, ApparentSky, make_air
 from acu_daemon.sim.parts import AcuParts

@@ -3,7 +3,7 @@
 from dataclasses import fields, replace
 from typing import Literal
 
-from acu_daemon.protocol.messages import Faults
+from acu_daemon.drivers.sa3842.messages import Faults
 
 FaultNibble = Literal["azimuth", "elevation", "tilt", "encoders", "interlock", "system", "receiver"]
 WATCHDOG_BIT = 1

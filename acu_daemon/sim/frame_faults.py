@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Callable
 from random import Random
 
-from acu_daemon.protocol.frame import ADDRESSES, ETX, NAK, OVERHEAD_BYTES, Frame, encode_frame
+from acu_daemon.drivers.sa3842.frame import ADDRESSES, ETX, NAK, OVERHEAD_BYTES, Frame, encode_frame
 from acu_daemon.sim.fault_board import FaultBoard
 from acu_daemon.sim.fault_verbs import Direction, Fault, VerbName
 

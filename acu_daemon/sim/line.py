@@ -6,8 +6,8 @@ Runs on the timers of the running loop, real or virtual; knows nothing of socket
 import asyncio
 from collections.abc import Callable
 
+from acu_daemon.drivers.sa3842.codec import CommandDecoder, CommandEvent
 from acu_daemon.edge.clock import Clock
-from acu_daemon.protocol.sa3842 import CommandDecoder, CommandEvent
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.fault_board import FaultBoard
 from acu_daemon.sim.frame_faults import FaultyWire

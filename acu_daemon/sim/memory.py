@@ -3,10 +3,10 @@
 import asyncio
 import math
 
+from acu_daemon.drivers.sa3842.frame import MAX_DATA_BYTES
 from acu_daemon.edge.arrivals import Arrivals
 from acu_daemon.edge.clock import Clock
 from acu_daemon.errors import LinkError, LinkRefusedError
-from acu_daemon.protocol.frame import MAX_DATA_BYTES
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.fault_board import FaultBoard
 from acu_daemon.sim.fault_verbs import Fault, VerbName

@@ -1,8 +1,8 @@
 """SIMULATION of the parameters of 3Bh/3Ch: names, codes, power-up values and ranges (docs/protocol.md, Parameters)."""
 
+from acu_daemon.drivers.sa3842.angles import elevation_deg
+from acu_daemon.drivers.sa3842.status_block import AGC_LSB_DB
 from acu_daemon.model import AxisLimits
-from acu_daemon.protocol.angles import elevation_deg
-from acu_daemon.protocol.status_block import AGC_LSB_DB
 
 TIME_LSB_S = 0.02
 _POWER_UP = {"A": 250, "R": 750, "P": 750, "M": 0, "T": 60, "S": 0, "W": 0}

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
+from acu_daemon.drivers.sa3842.codec import DEFAULT_ADDRESS
 from acu_daemon.model import AxisLimits
-from acu_daemon.protocol.sa3842 import DEFAULT_ADDRESS
 from acu_daemon.sim.scenario import Scenario
 from acu_daemon.sim.sky import SimulatedSky
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
+from acu_daemon.drivers.sa3842.messages import AcuMode
 from acu_daemon.errors import UsageError
 from acu_daemon.orbit.timescales import utc_text
-from acu_daemon.protocol.messages import AcuMode
 
 HEADER = ("utc", "az_deg", "el_deg", "mode", "followed")
 

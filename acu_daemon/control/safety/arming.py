@@ -9,7 +9,7 @@ from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.startup import WATCHDOG
 from acu_daemon.control.state import Arming, ControlState, StartStage, Watchdog
 from acu_daemon.control.tick_input import Exchange
-from acu_daemon.protocol.messages import Ack, AcuMode, Command, Stop, WriteParameter
+from acu_daemon.drivers.sa3842.messages import Ack, AcuMode, Command, Stop, WriteParameter
 
 NO_STOP_MODES = (AcuMode.MANUAL, AcuMode.STOWING, AcuMode.STOWED, AcuMode.FAULT)  # a stop would disturb, or do nothing
 

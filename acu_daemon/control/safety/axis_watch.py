@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from enum import Enum, auto
 from math import cos, inf, radians
 
+from acu_daemon.drivers.sa3842.messages import AcuMode, Status
 from acu_daemon.model import AxisLimits
-from acu_daemon.protocol.messages import AcuMode, Status
 
 PROGRESS_SHARE = 0.25  # of the following error: an axis that came so much nearer to its command obeys
 AWAY_S = 0.5  # a motion the wrong way must be seen for this long

@@ -11,8 +11,8 @@ from acu_daemon.control.orders import Event, Orders
 from acu_daemon.control.registers import count_refusals
 from acu_daemon.control.startup import SECTOR, WATCHDOG
 from acu_daemon.control.state import ControlState, StartStage
-from acu_daemon.protocol.angles import LSB_DEG
-from acu_daemon.protocol.messages import (
+from acu_daemon.drivers.sa3842.angles import LSB_DEG
+from acu_daemon.drivers.sa3842.messages import (
     AcuMode,
     Backup,
     Command,

@@ -7,8 +7,8 @@ nothing is fitted, but nothing is stopped.
 from dataclasses import dataclass
 
 from acu_daemon.control.safety.axis_watch import az_ends, el_ends, sky_scale
+from acu_daemon.drivers.sa3842.messages import Status
 from acu_daemon.model import Pointing
-from acu_daemon.protocol.messages import Status
 
 FROZEN_DEG = 0.1  # 18 codes: so far must the satellite move, on the sky, under an encoder that shows the same one
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 from math import inf, isnan
 
 from acu_daemon.control.tick_input import Observation, PassPlan, Sky
+from acu_daemon.drivers.sa3842.messages import Status
 from acu_daemon.model import MOST_DEG, FitResult, Prediction, Reading
-from acu_daemon.protocol.messages import Status
 
 MOST_S = 1e12  # 30 000 years: more is no time
 

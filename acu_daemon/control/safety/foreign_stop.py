@@ -7,7 +7,7 @@ from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState, ForeignStop, Held, StartStage
 from acu_daemon.control.tick_input import Observation
 from acu_daemon.control.tracking.state_table import ACTIVE, TrackState
-from acu_daemon.protocol.messages import AcuMode, Backup, Faults, Nak, ReadFaults
+from acu_daemon.drivers.sa3842.messages import AcuMode, Backup, Faults, Nak, ReadFaults
 
 STOPPED_FROM = (AcuMode.REMOTE, AcuMode.ACQUIRE, AcuMode.AUTOTRACK, AcuMode.REMOTE_BACKUP)
 ANOTHER_HAND = "another hand that stopped the antenna"

@@ -6,7 +6,7 @@ from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState, Interlock, StartStage
 from acu_daemon.control.tick_input import Observation
 from acu_daemon.control.tracking.state_table import TrackState
-from acu_daemon.protocol.messages import Command, Faults, ReadFaults, Status
+from acu_daemon.drivers.sa3842.messages import Command, Faults, ReadFaults, Status
 
 EMERGENCY_STOP, DOOR_OPEN = 1, 2  # of the interlock nibble: docs/protocol.md, Fault detail
 

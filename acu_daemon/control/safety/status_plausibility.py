@@ -8,8 +8,8 @@ mode may be anything, when half a second of them agree.
 from dataclasses import dataclass
 
 from acu_daemon.control.safety.axis_watch import sky_scale
+from acu_daemon.drivers.sa3842.messages import AcuMode, Backup, Status
 from acu_daemon.model import AxisLimits
-from acu_daemon.protocol.messages import AcuMode, Backup, Status
 from acu_daemon.units import wrap_180
 
 MOVED_COUNT, CONTRADICTING_COUNT = 2, 5  # in a row, before they are believed

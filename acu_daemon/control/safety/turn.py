@@ -26,9 +26,9 @@ from enum import Enum, auto
 from math import inf
 
 from acu_daemon.control.safety.axis_watch import BRAKING_MARGIN
+from acu_daemon.drivers.sa3842.messages import Status
 from acu_daemon.model import AxisLimits
 from acu_daemon.pointing.wrap import END_SLACK_DEG, encoder_continuous, is_one_turn, middle_deg, nearest_turn, turns_of
-from acu_daemon.protocol.messages import Status
 from acu_daemon.units import wrap_180
 
 SURE_COUNT, DENIED_COUNT = 10, 5

@@ -45,8 +45,8 @@ from acu_daemon.control.state import ControlState, StartStage
 from acu_daemon.control.tick_input import Observation
 from acu_daemon.control.tracking.causes import is_acquired
 from acu_daemon.control.tracking.state_table import ACTIVE, TrackState
+from acu_daemon.drivers.sa3842.messages import AcuMode, Status
 from acu_daemon.model import Reading
-from acu_daemon.protocol.messages import AcuMode, Status
 
 LONGEST_STEP_DEG = 170.0  # between two readings; with more the turn is not known by counting
 STEP_DEG = 5.0

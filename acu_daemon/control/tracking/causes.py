@@ -11,9 +11,9 @@ from acu_daemon.control.tracking.pass_plan import pass_end_tai_s
 from acu_daemon.control.tracking.register_limiter import within_limits
 from acu_daemon.control.tracking.state_table import HOLDING, Cause, TrackState
 from acu_daemon.control.tracking.track_frame import extents, is_within, offset_of
+from acu_daemon.drivers.sa3842.messages import AcuMode, Status
 from acu_daemon.model import Pointing, sky_angle_deg
 from acu_daemon.pointing.wrap import nearest_turn
-from acu_daemon.protocol.messages import AcuMode, Status
 
 LINK_SILENCE_S = 0.5  # docs/protocol.md, Link
 ON_POINT_BEAMS = 0.25

@@ -6,7 +6,7 @@ control.tracking.lag has the theory.
 from dataclasses import replace
 
 from acu_daemon.control.state import ControlState, Lag
-from acu_daemon.protocol.angles import LSB_DEG
+from acu_daemon.drivers.sa3842.angles import LSB_DEG
 
 STEADY_SHARE = 0.1  # of a step of the registers: more change than that from one to the next is acceleration
 

@@ -2,7 +2,7 @@
 
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tracking.state_table import AUTOTRACKING, HOLDING, TrackState
-from acu_daemon.protocol.messages import AcuMode, Backup, Command, SelectBackup, SelectMode
+from acu_daemon.drivers.sa3842.messages import AcuMode, Backup, Command, SelectBackup, SelectMode
 
 STANDBY = SelectMode(AcuMode.STANDBY)  # the one mode command that the ACU takes in STOWED: docs/protocol.md, Behaviour
 UNDER_AUTOTRACK = AUTOTRACKING | HOLDING | {TrackState.ACQUIRE_TLE, TrackState.SEARCH}

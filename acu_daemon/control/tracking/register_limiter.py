@@ -11,10 +11,10 @@ from math import copysign, cos, isfinite, radians
 
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState
+from acu_daemon.drivers.sa3842.angles import clamp_deg
 from acu_daemon.model import AxisLimits, Pointing
 from acu_daemon.pointing.axis import AxisState, step
 from acu_daemon.pointing.wrap import nearest_end_deg
-from acu_daemon.protocol.angles import clamp_deg
 
 LIMIT_SLACK_DEG = 0.1  # noise of a reading at a limit is clamped without a word
 PATH_MARGIN = 0.98  # of the drive's limits, on the path: the time between two writes is only nominally the period

@@ -5,10 +5,10 @@ Whoever wants another dialect replaces this module and keeps `messages`.
 
 from dataclasses import dataclass
 
-from acu_daemon.protocol.angles import azimuth_code, azimuth_deg, elevation_code, elevation_deg
-from acu_daemon.protocol.fields import FieldError, hex_text, hex_value, nibble_values, nibbles_text
-from acu_daemon.protocol.frame import ACK, NAK, OVERHEAD_BYTES, STX, BadFrame, Frame, FrameDecoder, encode_frame
-from acu_daemon.protocol.messages import (
+from acu_daemon.drivers.sa3842.angles import azimuth_code, azimuth_deg, elevation_code, elevation_deg
+from acu_daemon.drivers.sa3842.fields import FieldError, hex_text, hex_value, nibble_values, nibbles_text
+from acu_daemon.drivers.sa3842.frame import ACK, NAK, OVERHEAD_BYTES, STX, BadFrame, Frame, FrameDecoder, encode_frame
+from acu_daemon.drivers.sa3842.messages import (
     Ack,
     AcuMode,
     Backup,
@@ -36,7 +36,7 @@ from acu_daemon.protocol.messages import (
     WriteParameter,
     WriteRegisters,
 )
-from acu_daemon.protocol.status_block import STATUS_CHARS, decode_status, encode_status
+from acu_daemon.drivers.sa3842.status_block import STATUS_CHARS, decode_status, encode_status
 
 DEFAULT_ADDRESS = ord("1")
 STOW_GUARD = "ST"

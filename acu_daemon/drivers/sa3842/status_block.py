@@ -3,9 +3,9 @@
 from functools import lru_cache
 from typing import Any
 
-from acu_daemon.protocol.angles import azimuth_code, azimuth_deg, elevation_code, elevation_deg
-from acu_daemon.protocol.fields import FieldError, bits_value, hex_text, hex_value, nibble_values, nibbles_text
-from acu_daemon.protocol.messages import AcuMode, Backup, Status
+from acu_daemon.drivers.sa3842.angles import azimuth_code, azimuth_deg, elevation_code, elevation_deg
+from acu_daemon.drivers.sa3842.fields import FieldError, bits_value, hex_text, hex_value, nibble_values, nibbles_text
+from acu_daemon.drivers.sa3842.messages import AcuMode, Backup, Status
 
 STATUS_CHARS = 23
 AGC_LSB_DB = 0.05

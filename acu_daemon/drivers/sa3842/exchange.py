@@ -14,8 +14,8 @@ Times are readings of any clock that never goes back, seconds.
 
 from math import inf
 
-from acu_daemon.protocol.messages import Command, Garbled, Identify, Poll, ReadFaults, ReadRegisters, Reply
-from acu_daemon.protocol.sa3842 import CMD_OF, DEFAULT_ADDRESS, ReplyDecoder, encode_command
+from acu_daemon.drivers.sa3842.codec import CMD_OF, DEFAULT_ADDRESS, ReplyDecoder, encode_command
+from acu_daemon.drivers.sa3842.messages import Command, Garbled, Identify, Poll, ReadFaults, ReadRegisters, Reply
 
 LATE_S = 0.5  # so long after its exchange was given up a reply may still come
 OVERTAKEN_S = 60.0  # so long a line that let a reply be overtaken is not trusted to keep the order
