@@ -7,7 +7,7 @@ from acu_daemon.model import Site, Station
 from acu_daemon.orbit.sun import sun_direction_deg
 from acu_daemon.orbit.timescales import tai_from_utc
 
-RIGHT_DEG = 0.01  # what the Astronomical Almanac promises of these formulas from 1950 to 2050
+RIGHT_DEG = 0.001
 SKYFIELD = [  # latitude, longitude, height in m; azimuth and geometric elevation
     (-15.53, -56.07, 277.0, "1989-02-01T02:00:00Z", 222.844, -46.2795),  # Cuiaba
     (78.23, 15.39, 450.0, "2026-06-21T12:00:00Z", 196.7295, 34.7637),  # Svalbard

@@ -90,6 +90,13 @@ def teme_from_tod(tai_s: Array) -> Array:
     return _about_z(_equinox_rad(tai_s, t, _nutation_rad(t)[0]))
 
 
+def ecliptic_rad(tai_s: Array) -> tuple[Array, Array]:
+    """Nutation in longitude, and the true obliquity of the ecliptic, at the times (N,)."""
+    t = _centuries(tai_s)
+    longitude, obliquity = _nutation_rad(t)
+    return longitude, _arcsec(_OBLIQUITY, t) + obliquity
+
+
 def _centuries(tai_s: Array) -> Array:
     """Julian centuries of TT since J2000.0."""
     return (tai_s + _TT_MINUS_TAI_S) / _CENTURY_S

@@ -14,7 +14,7 @@ of the azimuth there is below CA + NPAE + tilt on the sky.
 """
 
 from dataclasses import dataclass, fields
-from math import sin
+from math import cos, sin
 
 import numpy as np
 import numpy.typing as npt
@@ -60,6 +60,19 @@ class Mount:
             determinant = aa * ee - ae * ea
             az, el = az + (ee * off_az - ae * off_el) / determinant, el + (aa * off_el - ea * off_az) / determinant
         return az, el
+
+    def beam_near(self, encoder_az_deg: float, encoder_el_deg: float) -> tuple[float, float]:
+        """The same for one direction, quickly, to 0.01 deg on the sky (the greatest terms, from the horizon on)."""
+        az_deg, el_deg = encoder_az_deg - self.ia_deg, encoder_el_deg - self.ie_deg
+        for _ in range(2):
+            a, h = az_deg * DEG, el_deg * DEG
+            sine, cosine = sin(h), cos(h)
+            secant = cosine / (cosine * cosine + _ZENITH_SINE2)
+            leaning = self.npae_deg + self.an_deg * sin(a) + self.aw_deg * cos(a)
+            along = self.an_deg * cos(a) - self.aw_deg * sin(a)
+            az_deg = encoder_az_deg - self.ia_deg - (self.ca_deg + leaning * sine) * secant
+            el_deg = encoder_el_deg - self.ie_deg - self.tf_deg * cosine - along
+        return az_deg, el_deg
 
     def by_direction(self, az_deg: Array, el_deg: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
         """Derivatives of the encoders by the direction: ((azimuth by A, by h), (elevation by A, by h))."""
