@@ -154,13 +154,18 @@ class AngleBias:
 
     Azimuth shows az_deg + az_sec_deg / cos(el) more (the second is the same everywhere across the beam's path, like a
     collimation error), elevation el_deg + el_cot_deg cot(el) (the second is shaped like refraction; where the site's
-    antenna has air, like that air's, by its value at 45 deg: what the refraction is off the one told).
+    antenna has air, like that air's, by its value at 45 deg: what the refraction is off the one told).  The others are
+    the mount's terms beyond those surveyed (docs/antenna-model.md, Mount).
     """
 
     az_deg: float = 0.0
     az_sec_deg: float = 0.0
     el_deg: float = 0.0
     el_cot_deg: float = 0.0
+    npae_deg: float = 0.0
+    an_deg: float = 0.0
+    aw_deg: float = 0.0
+    tf_deg: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +182,7 @@ class FitResult:
     across_deg: float  # and across it, seen from the station, right of the motion positive
     bias: AngleBias = AngleBias()
     station_shift_enu_m: tuple[float, float, float] = (0.0, 0.0, 0.0)  # the station's true place minus the given one
-    covariance: Array | None = field(default=None, compare=False, repr=False)  # (13, 13), see full.estimated_states
+    covariance: Array | None = field(default=None, compare=False, repr=False)  # (17, 17), see full.estimated_states
 
 
 MOST_DEG = 1e5  # more is no azimuth, however often the path goes round, and no rate

@@ -147,7 +147,7 @@ def _correlation(covariance: Array) -> Array:
 
 def _along_rad(prior: Prior, at_tai_s: float) -> float:
     """1 sigma of mean anomaly plus perigee at an instant."""
-    row = np.zeros(13)
+    row = np.zeros(17)
     row[1], row[2] = 1.0, at_tai_s - SOURCE.epoch_tai_s
     return float(np.sqrt(row @ prior.covariance @ row))
 
@@ -223,7 +223,7 @@ def test_what_is_too_old_or_from_later_or_no_orbits_correction_is_dropped() -> N
         ({"bias": AngleBias(az_deg=50.0)}, "its biases are more than 5 of the [readings] bias_sigma"),
         ({"bias": AngleBias(el_deg=-0.6)}, "its biases are more than 5 of the [readings] bias_sigma"),
         ({"station_shift_enu_m": (1e6, 0.0, 0.0)}, "its shift of the station is more than 5 times [station] uncert"),
-        ({"covariance": np.zeros((13, 13))}, "its covariance is not that of a fit"),
+        ({"covariance": np.zeros((17, 17))}, "its covariance is not that of a fit"),
         ({"covariance": 1e6 * CARRIED.covariance}, "its covariance is not that of a fit"),
     ],
 )

@@ -20,7 +20,7 @@ from acu_daemon.edge.writer import Writer
 from acu_daemon.model import AngleBias, Correction, FitResult, Station
 
 ISS = "ISS (25544)"
-ROOT = np.random.default_rng(1).normal(size=(13, 13)) * np.logspace(-9, 3, 13)[:, None]
+ROOT = np.random.default_rng(1).normal(size=(17, 17)) * np.logspace(-9, 3, 17)[:, None]
 CARRIED = CarryOver(
     at_tai_s=599012992.123456,
     estimator="full",
@@ -60,6 +60,19 @@ def test_what_is_read_is_what_was_written_to_the_last_bit(path: Path) -> None:
     assert (read.states == CARRIED.states).all()
 
 
+def test_a_file_from_before_the_mounts_terms_were_states_is_read(path: Path) -> None:
+    said = json.loads(written(path).read_text())
+    for name in ("npae_deg", "an_deg", "aw_deg", "tf_deg"):
+        del said["bias"][name]
+    said["covariance"] = [row[:13] for row in said["covariance"][:13]]
+    path.write_text(json.dumps(said))
+    read = read_carry_over(path, ISS)
+    assert read is not None
+    assert read.bias == CARRIED.bias
+    assert (read.covariance[:13, :13] == CARRIED.covariance[:13, :13]).all()
+    assert not read.covariance[13:].any()
+
+
 def test_people_can_read_whose_it_is_and_when(path: Path) -> None:
     said = json.loads(written(path).read_text())
     assert (said["satellite"], said["station"]["name"]) == (ISS, "Cuiaba")
@@ -94,17 +107,17 @@ def changed(key: str, value: Any) -> Callable[[dict[str, Any]], None]:
         (changed("correction.delta_raan_rad", True), "True: expected a number"),
         (changed("correction.delta_x", 1.0), "expected delta_e_cos_argp, delta_e_sin_argp, delta_inclination_rad"),
         (changed("correction", {}), "expected delta_e_cos_argp, delta_e_sin_argp, delta_inclination_rad"),
-        (changed("bias", 1.0), "expected az_deg, az_sec_deg, el_cot_deg, el_deg"),
+        (changed("bias", 1.0), "expected an_deg, aw_deg, az_deg, az_sec_deg, el_cot_deg, el_deg, npae_deg, tf_deg"),
         (changed("station", None), "not in the form in which it is written"),
         (changed("station", {"name": "here"}), "expected height_m, latitude_deg, longitude_deg, name"),
         (changed("station_shift_enu_m", [1.0]), "expected 3 numbers"),
         (changed("elements", {}), "kind is missing"),
-        (changed("covariance", [[1.0]]), "expected 13 x 13 numbers"),
+        (changed("covariance", [[1.0]]), "expected 17 x 17 numbers"),
         (changed("covariance", (-np.eye(13)).tolist()), "covariance: expected a symmetric matrix without negative"),
         (changed("covariance", np.tri(13).tolist()), "covariance: expected a symmetric matrix without negative"),
-        (changed("covariance", np.diag([1.0] * 12 + [-1.0]).tolist()), "covariance: expected a symmetric matrix"),
-        (changed("covariance", (np.eye(13) - np.eye(13, k=1) - np.eye(13, k=-1)).tolist()), "covariance: expected a"),
-        (changed("covariance", [*[[1e308] * 13] * 12, [5e-324] * 13]), "covariance: expected a"),
+        (changed("covariance", np.diag([1.0] * 16 + [-1.0]).tolist()), "covariance: expected a symmetric matrix"),
+        (changed("covariance", (np.eye(17) - np.eye(17, k=1) - np.eye(17, k=-1)).tolist()), "covariance: expected a"),
+        (changed("covariance", [*[[1e308] * 17] * 16, [5e-324] * 17]), "covariance: expected a"),
     ],
 )
 def test_a_file_with_something_wrong_is_reported_and_not_used(

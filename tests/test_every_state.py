@@ -1,7 +1,7 @@
 """`full` with each of its states open, also those that are off by default: against a geometry of the test's own.
 
 What the encoders show is made from vectors here: the true place on the ellipsoid with the vertical and the north that
-belong to it, and the biases as docs and model.AngleBias define them.
+belong to it, and the biases as docs and model.AngleBias define them; the mount's axes are the simulator's, which turn.
 """
 
 import numpy as np
@@ -22,6 +22,7 @@ from acu_daemon.assist.mount_model import encoder_look, sky_covariance
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings
 from acu_daemon.model import Readings
 from acu_daemon.orbit.frames import itrs_from_teme
+from acu_daemon.sim.mount_axes import MountAxes
 from acu_daemon.units import DEG
 
 EQUATOR_M, FLATTENING = 6378137.0, 1.0 / 298.257223563  # WGS 84
@@ -45,10 +46,13 @@ STATION_SIGMA_M = 2000.0
 ORBIT = (0.05 * DEG, 0.3 * DEG, 2e-5 / 60.0, 2e-4, 2e-4, 0.05 * DEG)
 BIASES = (0.11 * DEG, 0.07 * DEG, 0.13 * DEG, 0.05 * DEG)
 STATION_M = (2000.0, 2000.0, 200.0)  # heights are known ten times as well as places
-SIGMAS = np.array([*ORBIT, *BIASES, *STATION_M])  # in the order of assist.estimators.full.estimated_states
+MOUNT_SIGMAS_DEG = (0.08, 0.05, 0.06, 0.07)  # NPAE, AN, AW, TF
+MOUNT = tuple(one * DEG for one in MOUNT_SIGMAS_DEG)
+SIGMAS = np.array([*ORBIT, *BIASES, *STATION_M, *MOUNT])  # in the order of assist.estimators.full.estimated_states
 NAMES = (
     *("raan", "mean anomaly", "mean motion", "e cos argp", "e sin argp", "inclination"),
     *("azimuth", "azimuth / cos h", "elevation", "elevation x cot h", "east", "north", "up"),
+    *("npae", "an", "aw", "tf"),
 )
 OF_NAME = ("raan_deg", "mean_anomaly_deg", "mean_motion_rad_min", "e_vector", "e_vector", "inclination_deg")
 
@@ -60,6 +64,7 @@ def settings(states) -> EstimatorSettings:
     biases = {name: sigma if 6 + i in states else 0.0 for i, (name, sigma) in enumerate(BIAS_SIGMAS.items())}
     station_m = STATION_SIGMA_M if {10, 11, 12} & set(states) else 0.0
     sigmas = ElementSigmas(**closed | orbit)
+    biases["mount_sigmas_deg"] = tuple(one if 13 + i in states else 0.0 for i, one in enumerate(MOUNT_SIGMAS_DEG))
     return EstimatorSettings(NOISE_DEG, NOISE_DEG, orbit_sigmas=sigmas, station_sigma_m=station_m, **biases)
 
 
@@ -88,12 +93,15 @@ def shown(x, tai_s):
     """What the encoders show of the truth with the states x: azimuth and elevation, degrees."""
     station = GIVEN.station
     at_m, axes = place(station.latitude_deg, station.longitude_deg, station.height_m)
-    at_m, axes = place(*geodetic(at_m + axes.T @ x[10:]))
+    at_m, axes = place(*geodetic(at_m + axes.T @ x[10:13]))
     r_m, v_m_s = SOURCE.corrected(correction_of(x)).states_teme(tai_s)
     east, north, up = axes @ (itrs_from_teme(r_m, v_m_s, tai_s, GIVEN.orientation)[0] - at_m).T
     el = np.arctan2(up, np.hypot(east, north))
     az_deg = np.arctan2(east, north) / DEG + (x[6] + x[7] / np.cos(el)) / DEG
-    return az_deg % 360.0, (el + x[8] + x[9] / np.tan(el)) / DEG
+    el_deg = (el + x[8] + x[9] / np.tan(el)) / DEG
+    axes_at = MountAxes(0.0, 0.0, 0.0, *(x[13:] / DEG).tolist())
+    encoders = np.array([axes_at.encoders_deg(*one) for one in zip(az_deg.tolist(), el_deg.tolist(), strict=True)]).T
+    return encoders[0] % 360.0, encoders[1]
 
 
 def fit_of(readings, chosen):

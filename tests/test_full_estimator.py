@@ -11,7 +11,15 @@ from made_orbits import EPOCH_TAI_S, circular, site, visible
 from real_passes import noisy, sky_angles_deg
 
 from acu_daemon.assist import mount_model
-from acu_daemon.assist.estimators.full.estimated_states import STATE_COUNT, STEPS, correction_of, make_prior, states_of
+from acu_daemon.assist.estimators.full.estimated_states import (
+    STATE_COUNT,
+    STEPS,
+    bias_of,
+    correction_of,
+    make_prior,
+    shift_of,
+    states_of,
+)
 from acu_daemon.assist.estimators.full.full_estimator import FullEstimator, shift_for_people
 from acu_daemon.assist.estimators.full.path_partials import (
     moved_site,
@@ -129,15 +137,15 @@ def test_partials_are_what_small_changes_of_every_state_do_to_the_directions():
     nodes, zero = node_times(tai_s[0], tai_s[-1]), np.zeros(STATE_COUNT)
     path, partials = orbit_partials_itrs(source, zero, where, nodes)
     h = sky_partials(path.at(tai_s), partials.at(tai_s), where, True)
-    steps = np.concatenate((10.0 * np.array(STEPS), np.full(4, 1e-4), np.full(3, 100.0)))
+    steps = np.concatenate((10.0 * np.array(STEPS), np.full(4, 1e-4), np.full(3, 100.0), np.full(4, 1e-4)))
     plain = look_at(source, tai_s, where)
     for k, step in enumerate(steps):
         x = zero.copy()
         x[k] = step
         fit = replace(
             _fit(source, where, Readings(tai_s[:1], plain.az_deg[:1], plain.el_deg[:1])),
-            bias=AngleBias(*(x[6:10] / DEG)),
-            station_shift_enu_m=tuple(x[10:]),
+            bias=bias_of(x),
+            station_shift_enu_m=shift_of(x),
         )
         seen = encoder_look(source.corrected(correction_of(x)), tai_s, where, fit)
         across = (seen.az_deg - plain.az_deg + 180.0) % 360.0 - 180.0
@@ -158,7 +166,7 @@ def test_rates_in_the_encoder_frame_are_those_of_the_angles():
     source, where = circular(), site()
     tai_s = visible(source, where, 0.1)
     fit = _fit(source, where, Readings(tai_s[:1], *(x[:1] for x in _shown(source, where, tai_s))))
-    fit = replace(fit, bias=AngleBias(0.05, 0.05, -0.04, 0.05))
+    fit = replace(fit, bias=AngleBias(0.05, 0.05, -0.04, 0.05, 0.02, -0.03, 0.04, 0.03))
     seen, plain = encoder_look(source, tai_s, where, fit), look_at(source, tai_s, where)
     bias_el_deg, bias_az_deg = seen.el_deg - plain.el_deg, (seen.az_deg - plain.az_deg + 180.0) % 360.0 - 180.0
     bias_el_rate, bias_az_rate = seen.el_rate_deg_s - plain.el_rate_deg_s, seen.az_rate_deg_s - plain.az_rate_deg_s

@@ -127,7 +127,7 @@ def test_a_flight_in_air_that_was_told_holds_the_satellite_through_a_loss() -> N
 
 def test_a_fit_in_a_vacuum_is_not_carried_into_air_nor_biases_to_another_mount() -> None:
     def carried(site: Site) -> CarryOver:
-        fit = FitResult("full", Correction(), SOURCE.epoch_tai_s, 100, 0, 0.0, 0.0, 0.0, covariance=np.eye(13))
+        fit = FitResult("full", Correction(), SOURCE.epoch_tai_s, 100, 0, 0.0, 0.0, 0.0, covariance=np.eye(17))
         kept = carry_over_of(fit, SOURCE, site)
         assert kept is not None
         return from_json(to_json("SAT", kept), "SAT")
@@ -166,3 +166,5 @@ def test_a_surveys_sigma_says_how_far_a_fit_may_move_the_encoders() -> None:
 
     assert sigmas() == (0.1, 0.1, 0.003)
     assert sigmas(ia_sigma_deg=0.01, ie_sigma_deg=0.0, ca_sigma_deg=0.005) == (0.01, 0.0, 0.005)
+    target = demo_target(mount={"npae_sigma_deg": 0.02, "aw_sigma_deg": 0.01, "tf_deg": 0.03})
+    assert estimator_settings(target.station, target.satellite).mount_sigmas_deg == (0.02, 0.0, 0.01, 0.0)

@@ -10,7 +10,14 @@ from functools import lru_cache
 
 import numpy as np
 
-from acu_daemon.assist.estimators.full.estimated_states import ORBIT, STATE_COUNT, STATION, STEPS, states_of
+from acu_daemon.assist.estimators.full.estimated_states import (
+    MOUNT_TERMS,
+    ORBIT,
+    STATE_COUNT,
+    STATION,
+    STEPS,
+    states_of,
+)
 from acu_daemon.assist.estimators.full.path_partials import (
     Curve,
     low_shape,
@@ -24,6 +31,8 @@ from acu_daemon.assist.estimators.full.path_partials import (
 from acu_daemon.model import AngleBias, Antenna, Correction, FitResult, Site
 from acu_daemon.orbit.look import Look, look_at
 from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.pointing.antenna_model import AntennaModel
+from acu_daemon.pointing.mount import Mount
 from acu_daemon.units import DEG, Array
 
 _SIGMA_STEP_S = 5.0
@@ -41,6 +50,8 @@ def encoder_look(
     seen = look(propagator, tai_s, site if fit is None else moved_site(site, fit.station_shift_enu_m))
     if fit is not None and fit.bias != AngleBias():
         seen = _biased(seen, fit.bias, site)
+        mount = Mount(**{name: getattr(fit.bias, name) for name in MOUNT_TERMS})
+        seen = seen if mount == Mount() else _on_encoders(seen, AntennaModel(mount))
     return seen if site.antenna is None else _on_encoders(seen, site.antenna)
 
 

@@ -76,8 +76,8 @@ class EstimatorSettings:
     the elevation's.  Without axis limits no reading counts as too fast.  inversion_count: consecutive inversions that
     `circular` averages, 3 to 8 (Aguirre and Medeiros 1988, 2.6c).
 
-    For `full`: the biases' sigmas (model.AngleBias), the orbit's (None: from the kind of elements and their age) and
-    the station's, east and north each, metres.
+    For `full`: the biases' sigmas (model.AngleBias), those of NPAE, AN, AW and TF, the orbit's (None: from the kind of
+    elements and their age) and the station's, east and north each, metres.
     """
 
     sigma_azimuth_deg: float = 0.05
@@ -93,6 +93,7 @@ class EstimatorSettings:
     bias_sigma_azimuth_sec_deg: float = 0.003
     bias_sigma_elevation_deg: float = 0.1
     bias_sigma_elevation_cot_deg: float = 0.0
+    mount_sigmas_deg: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     orbit_sigmas: ElementSigmas | StateSigmas | None = None
     station_sigma_m: float = 0.0
 

@@ -167,25 +167,29 @@ class MountSection(Section):
         default=None,
         ge=0,
         le=1,
-        description="How well NPAE is known, 1 sigma; left out: not surveyed.  Decides nothing yet: no fit moves it.",
+        description="How well NPAE is known, 1 sigma; left out: not surveyed.  Decides how far a fit may move it, "
+        "which without a sigma it does not.",
     )
     an_sigma_deg: float | None = Field(
         default=None,
         ge=0,
         le=1,
-        description="How well AN is known, 1 sigma; left out: not surveyed.  Decides nothing yet: no fit moves it.",
+        description="How well AN is known, 1 sigma; left out: not surveyed.  Decides how far a fit may move it, "
+        "which without a sigma it does not.",
     )
     aw_sigma_deg: float | None = Field(
         default=None,
         ge=0,
         le=1,
-        description="How well AW is known, 1 sigma; left out: not surveyed.  Decides nothing yet: no fit moves it.",
+        description="How well AW is known, 1 sigma; left out: not surveyed.  Decides how far a fit may move it, "
+        "which without a sigma it does not.",
     )
     tf_sigma_deg: float | None = Field(
         default=None,
         ge=0,
         le=1,
-        description="How well TF is known, 1 sigma; left out: not surveyed.  Decides nothing yet: no fit moves it.",
+        description="How well TF is known, 1 sigma; left out: not surveyed.  Decides how far a fit may move it, "
+        "which without a sigma it does not.",
     )
 
     @model_validator(mode="after")
@@ -197,6 +201,11 @@ class MountSection(Section):
                 "their signs, up to which the encoders tell one direction everywhere"
             )
         return self
+
+    @property
+    def axis_sigmas_deg(self) -> tuple[float, float, float, float]:
+        """Of NPAE, AN, AW and TF; 0 of one that no survey gave: it stays as it is."""
+        return self.npae_sigma_deg or 0.0, self.an_sigma_deg or 0.0, self.aw_sigma_deg or 0.0, self.tf_sigma_deg or 0.0
 
     def mount(self) -> Mount:
         return Mount(**{name: getattr(self, name) for name in TERMS})

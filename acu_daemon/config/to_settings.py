@@ -54,6 +54,7 @@ def estimator_settings(station: StationFile, satellite: SatelliteFile) -> Estima
         bias_sigma_elevation_cot_deg=hypot(
             station.readings.bias_sigma_elevation_cot_deg, station.atmosphere.cot_sigma_deg(station.site.station)
         ),
+        mount_sigmas_deg=station.mount.axis_sigmas_deg,
         orbit_sigmas=_orbit_sigmas(satellite.uncertainty),
         station_sigma_m=station.station.uncertainty_m / 2**0.5,  # of east and of north each
     )

@@ -12,7 +12,7 @@ import numpy as np
 import structlog
 
 from acu_daemon.assist.estimators.full.carry_over import CarryOver
-from acu_daemon.assist.estimators.full.estimated_states import STATE_COUNT
+from acu_daemon.assist.estimators.full.estimated_states import MOUNT_TERMS, STATE_COUNT
 from acu_daemon.edge.writer import Latest, Writer, replace_file
 from acu_daemon.errors import OrbitError
 from acu_daemon.model import AngleBias, Correction, FitResult, Station
@@ -20,6 +20,7 @@ from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.units import Array
 
 VERSION = 1
+FORMER_STATE_COUNT = 13  # of files from before the mount's terms were states
 SAVE_PERIOD_S = 10.0  # so much of a pass a crash may lose
 _LARGEST_BYTES = 100_000
 _ROUNDING = 1e-6  # of correlations and their eigenvalues
@@ -135,7 +136,7 @@ def from_json(read: Any, satellite: str) -> CarryOver:
         elements_epoch_tai_s=number(elements["epoch_tai_s"]),
         states=_numbers(elements["states_teme_m_m_s"], (2, 6)),
         correction=Correction(**_fields(read["correction"], Correction)),
-        bias=AngleBias(**_fields(read["bias"], AngleBias)),
+        bias=AngleBias(**_fields(_with_axes(read["bias"]), AngleBias)),
         station_shift_enu_m=(east_m, north_m, up_m),
         covariance=_covariance(read["covariance"]),
         frame=str(read.get("frame", "")),
@@ -170,6 +171,11 @@ def _fields(values: Any, kind: type[Correction | AngleBias | Station], text: str
     return {name: number(value) for name, value in values.items() if name != text}
 
 
+def _with_axes(bias: Any) -> Any:
+    """Files from before the mount's terms were states have none of them."""
+    return {**dict.fromkeys(MOUNT_TERMS, 0.0), **bias} if isinstance(bias, dict) else bias
+
+
 def _numbers(values: Any, shape: tuple[int, ...]) -> Array:
     array = np.array(values, dtype=np.float64)
     if array.shape != shape or not np.isfinite(array).all():
@@ -179,7 +185,9 @@ def _numbers(values: Any, shape: tuple[int, ...]) -> Array:
 
 def _covariance(values: Any) -> Array:
     """Zeros belong to states that no fit changes, and to estimators that give none."""
-    covariance = _numbers(values, (STATE_COUNT, STATE_COUNT))
+    covariance = np.zeros((STATE_COUNT, STATE_COUNT))
+    count = FORMER_STATE_COUNT if isinstance(values, list) and len(values) == FORMER_STATE_COUNT else STATE_COUNT
+    covariance[:count, :count] = _numbers(values, (count, count))
     variance = np.diag(covariance)
     is_state = variance > 0.0
     unit = np.sqrt(variance[is_state])

@@ -111,6 +111,19 @@ def shares(az_deg: Array, el_deg: Array) -> tuple[Array, Array]:
     return azimuths, elevations
 
 
+def axes_on_the_sky(sin_az: Array, cos_az: Array, sin_el: Array, cos_el: Array) -> Array:
+    """Give by how much a unit of NPAE, AN, AW and TF moves what is shown on the sky: across and upwards, (4, 2, N).
+
+    The formula of this module before the secant, so that it is finite at the zenith; sines and cosines (N,).
+    """
+    out: Array = np.zeros((4, 2, sin_el.size))
+    out[0, 0] = sin_el
+    out[1] = sin_az * sin_el, cos_az
+    out[2] = cos_az * sin_el, -sin_az
+    out[3, 1] = cos_el
+    return out
+
+
 def _secant(el_rad: Array) -> Array:
     """1 / cos h, bounded near the zenith."""
     cosine = np.cos(el_rad)

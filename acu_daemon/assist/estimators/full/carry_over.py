@@ -11,6 +11,7 @@ import numpy as np
 
 from acu_daemon.assist.estimators.full.estimated_states import (
     BIAS,
+    MOUNT,
     ORBIT,
     STATE_COUNT,
     STATION,
@@ -35,7 +36,20 @@ WIDEST_SIGMAS = 5.0  # what is beyond this many a-priori sigmas was no orbit's, 
 SAME_M, SAME_M_S = 1.0, 1e-3
 
 _MEAN_ANOMALY, _MEAN_MOTION = 1, 2
-_SLOW = (0, 3, 4, 5, 6, 7, 8, 9)  # node, e-vector, inclination, biases: what drifts without a trend
+_SLOW = (
+    0,
+    3,
+    4,
+    5,
+    6,
+    7,
+    8,
+    9,
+    13,
+    14,
+    15,
+    16,
+)  # node, e-vector, inclination, encoders: without a trend
 _SLOW_SHARE_PER_DAY = 0.1  # of the variance of new elements, of a new station's biases
 _WOBBLES = (3e-5, 5e-5, 0.0, 2e-5, 2e-5, 3e-5)  # of the orbit's states, rad: tesseral terms left out, 0.1 to 0.4 km
 _WOBBLE_RAD = 1e-4  # 0.7 km along the track, which come and go within hours, are nothing to carry
@@ -63,7 +77,7 @@ class CarryOver:
     correction: Correction
     bias: AngleBias
     station_shift_enu_m: tuple[float, float, float]
-    covariance: Array = field(compare=False, repr=False)  # (13, 13), see estimated_states
+    covariance: Array = field(compare=False, repr=False)  # (17, 17), see estimated_states
     frame: str = ""  # Antenna.frame of the site; empty: a perfect mount in a vacuum
     is_of_this_pass: bool = False  # of the pass in progress, left by a daemon that was started again: it does not age
 
@@ -210,7 +224,7 @@ def first_fit(carried: CarryOver, prior: Prior) -> FitResult:
 
 
 def _prior_sigma(carried: CarryOver, source: Propagator, settings: EstimatorSettings) -> Array:
-    """A-priori sigmas (13,); 0: no fit may change that state."""
+    """A-priori sigmas (17,); 0: no fit may change that state."""
     sigma: Array = np.sqrt(np.diag(make_prior(source, settings, carried.at_tai_s).covariance))
     return sigma
 
@@ -221,8 +235,8 @@ def _too_far(carried: CarryOver, prior_sigma: Array, *, has_covariance: bool) ->
     is_off = np.abs(_mean(carried)) > limit
     if is_off[ORBIT].any():
         return f"its correction is more than {WIDEST_SIGMAS:g} sigma from the elements"
-    if is_off[BIAS].any():
-        return f"its biases are more than {WIDEST_SIGMAS:g} of the [readings] bias_sigma"
+    if is_off[BIAS].any() or is_off[MOUNT].any():
+        return f"its biases are more than {WIDEST_SIGMAS:g} of the [readings] bias_sigma, or of the sigmas in [mount]"
     if is_off[STATION].any():
         return f"its shift of the station is more than {WIDEST_SIGMAS:g} times [station] uncertainty_m"
     sigma = np.sqrt(np.diag(carried.covariance))
@@ -298,7 +312,7 @@ def _significance(correction: Array, covariance: Array) -> float:
 
 
 def _process_noise(carried: CarryOver, settings: EstimatorSettings, fresh_variance: Array, at_tai_s: float) -> Array:
-    """What the time since the fit adds to the covariance (13, 13) of the states, which are those at epoch."""
+    """What the time since the fit adds to the covariance (17, 17) of the states, which are those at epoch."""
     passed_s, since_epoch_s = max(0.0, at_tai_s - carried.at_tai_s), at_tai_s - carried.elements_epoch_tai_s
     noise = np.zeros((STATE_COUNT, STATE_COUNT))
     slow = list(_SLOW)

@@ -6,6 +6,9 @@ docs/estimation.md, States, and docs/estimation.md, Prior, have the theory.
        e sin argp, inclination (rad, rad/s for the mean motion)
 6-9    angle biases, as in AngleBias: azimuth, azimuth / cos(el), elevation, elevation x cot(el) (rad)
 10-12  the station's true place minus the given one: east, north, up (m)
+13-16  the mount's terms that are no angle biases of every antenna: NPAE, AN, AW, TF (rad), docs/antenna-model.md, Mount
+
+States 6 and 8 are the mount's IA and IE, 7 its CA, 9 a scale of the refraction where there is air.
 """
 
 from dataclasses import dataclass, field
@@ -20,8 +23,9 @@ from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import DAY_S, DEG, Array
 
 ORBIT_COUNT = 6
-STATE_COUNT = 13
-ORBIT, BIAS, STATION = slice(0, 6), slice(6, 10), slice(10, 13)
+STATE_COUNT = 17
+ORBIT, BIAS, STATION, MOUNT = slice(0, 6), slice(6, 10), slice(10, 13), slice(13, 17)
+MOUNT_TERMS = ("npae_deg", "an_deg", "aw_deg", "tf_deg")  # of pointing.mount, in the order of the states
 EL_COT = 9
 STEPS = (1e-5, 1e-5, 1e-10, 1e-5, 1e-5, 1e-5)  # for differences: some 70 m each; 60 m after a day for the mean motion
 
@@ -30,14 +34,14 @@ _UP_SHARE = 0.1  # coordinates are rounded in latitude and longitude; heights ar
 
 @dataclass(frozen=True)
 class Prior:
-    """Mean (13,) and covariance (13, 13) of the states before the first reading."""
+    """Mean (17,) and covariance (17, 17) of the states before the first reading."""
 
     mean: Array
     covariance: Array = field(repr=False)
 
     @cached_property
     def root(self) -> Array:
-        """A root (13, M) of the covariance: covariance = root root^T, with M states that have a variance."""
+        """A root (17, M) of the covariance: covariance = root root^T, with M states that have a variance."""
         variance = np.diag(self.covariance)
         is_open = variance > 0.0
         sigma = np.sqrt(variance[is_open])
@@ -54,7 +58,7 @@ def correction_of(x: Array) -> Correction:
 
 def bias_of(x: Array) -> AngleBias:
     """The biases among the states."""
-    return AngleBias(*(x[BIAS] / DEG).tolist())
+    return AngleBias(*(x[BIAS] / DEG).tolist(), *(x[MOUNT] / DEG).tolist())
 
 
 def shift_of(x: Array) -> tuple[float, float, float]:
@@ -64,7 +68,7 @@ def shift_of(x: Array) -> tuple[float, float, float]:
 
 
 def states_of(correction: Correction, bias: AngleBias, shift_enu_m: tuple[float, float, float]) -> Array:
-    """The states that a fit found, (13,)."""
+    """The states that a fit found, (17,)."""
     orbit = [
         correction.delta_raan_rad,
         correction.delta_mean_anomaly_rad,
@@ -74,7 +78,8 @@ def states_of(correction: Correction, bias: AngleBias, shift_enu_m: tuple[float,
         correction.delta_inclination_rad,
     ]
     biases = [bias.az_deg * DEG, bias.az_sec_deg * DEG, bias.el_deg * DEG, bias.el_cot_deg * DEG]
-    return np.array([*orbit, *biases, *shift_enu_m])
+    mount = [getattr(bias, name) * DEG for name in MOUNT_TERMS]
+    return np.array([*orbit, *biases, *shift_enu_m, *mount])
 
 
 def make_prior(source: Propagator, settings: EstimatorSettings, at_tai_s: float) -> Prior:
@@ -94,6 +99,7 @@ def make_prior(source: Propagator, settings: EstimatorSettings, at_tai_s: float)
     covariance[BIAS, BIAS] = np.diag(np.radians(bias_deg) ** 2)
     flat_m = settings.station_sigma_m
     covariance[STATION, STATION] = np.diag(np.square([flat_m, flat_m, _UP_SHARE * flat_m]))
+    covariance[MOUNT, MOUNT] = np.diag(np.radians(settings.mount_sigmas_deg) ** 2)
     return Prior(np.zeros(STATE_COUNT), covariance)
 
 

@@ -58,7 +58,7 @@ class OrbitPartials:
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """States, their covariance (13, 13), and what the readings left."""
+    """States, their covariance (17, 17), and what the readings left."""
 
     x: Array
     covariance: Array

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from acu_daemon.assist.estimators.full.estimated_states import BIAS, EL_COT
+from acu_daemon.assist.estimators.full.estimated_states import BIAS, EL_COT, MOUNT
 from acu_daemon.assist.estimators.full.path_partials import Curve, cot_el, enu_m, low_shape
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import Readings, Site
+from acu_daemon.pointing.mount import axes_on_the_sky
 from acu_daemon.units import DEG, Array
 
 Indices = npt.NDArray[np.int64]
@@ -67,6 +68,9 @@ def residuals(path: Curve, here: Site, x: Array, settings: EstimatorSettings, se
     off, sigma = np.empty((2, 2, seen.tai_s.size))
     off[0] = seen.sin_az * north - seen.cos_az * east - az * cos_el - az_sec
     off[1] = seen.sin_el * (seen.sin_az * east + seen.cos_az * north) - seen.cos_el * up - el - el_cot * low
+    if x[MOUNT].any():
+        flat = np.maximum(cos_el, 1e-9)
+        off -= np.tensordot(x[MOUNT], axes_on_the_sky(east / flat, north / flat, up, cos_el), 1)
     sigma[0] = settings.sigma_azimuth_deg * DEG
     sigma[1] = (settings.sigma_elevation_deg + settings.sigma_elevation_cot_deg * cot) * DEG
     sigmas_off = off / sigma

@@ -5,10 +5,19 @@ from math import cos, radians
 
 import numpy as np
 
-from acu_daemon.assist.estimators.full.estimated_states import ORBIT_COUNT, STATE_COUNT, STEPS, correction_of, shift_of
+from acu_daemon.assist.estimators.full.estimated_states import (
+    MOUNT,
+    ORBIT_COUNT,
+    STATE_COUNT,
+    STATION,
+    STEPS,
+    correction_of,
+    shift_of,
+)
 from acu_daemon.model import Site
 from acu_daemon.orbit.frames import enu_from_itrs, itrs_from_teme, station_itrs_m
 from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.pointing.mount import axes_on_the_sky
 from acu_daemon.units import DEG, EARTH_EQUATORIAL_RADIUS_M, Array
 
 NODE_STEP_S = 20.0  # cubics through positions and velocities 20 s apart are good to 5 mm
@@ -112,7 +121,7 @@ def enu_m(r_itrs_m: Array, site: Site) -> Array:
 
 
 def sky_partials(r_itrs_m: Array, orbit_itrs: Array, site: Site, has_shift: bool) -> Array:
-    """What a unit of each state moves on the sky: (13, 2, N), across the elevation and in elevation, rad.
+    """What a unit of each state moves on the sky: (17, 2, N), across the elevation and in elevation, rad.
 
     r_itrs_m: (3, N); orbit_itrs: (6, 3, N), the second of `orbit_partials_itrs`; site: moved by the states; has_shift:
     whether the station's place is in question.
@@ -136,7 +145,8 @@ def sky_partials(r_itrs_m: Array, orbit_itrs: Array, site: Site, has_shift: bool
     out[8, 1] = 1.0
     out[9, 1] = low_shape(site, sin_el, cos_el, range_m)[0]
     if has_shift:
-        out[10:] = turned(station_partials_enu(r_itrs_m, site))
+        out[STATION] = turned(station_partials_enu(r_itrs_m, site))
+    out[MOUNT] = axes_on_the_sky(sin_az, cos_az, sin_el, cos_el)
     return out
 
 
