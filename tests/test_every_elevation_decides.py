@@ -4,6 +4,7 @@ Every place, path and offset is made by rotation of vectors, and none by a formu
 """
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -26,11 +27,12 @@ from acu_daemon.model import AxisLimits, Model, Pointing, Prediction, Reading
 from acu_daemon.pointing.axis import AxisState
 from acu_daemon.units import Array, wrap_180
 
-ELEVATIONS_DEG = (2.0, 20.0, 40.0, 60.0, 75.0, 85.0, 89.0)
+ELEVATIONS_DEG = (2.0, 20.0, 40.0, 60.0, 74.0, 85.0, 89.0, 89.9)
 COURSES_DEG = tuple(range(0, 360, 45))  # 0 is up, 90 is right
 NOW = 8.4e8
 SKY_DEG_S = 0.5
 STEP_S = 0.02  # fine: close to the zenith an azimuth has corners
+LEAST_SCALE = 0.01  # of a degree of azimuth on the sky: nearer than half a degree to the zenith it is all noise
 QUICK = 1e5  # of a drive that sets no limit here
 CONFIG = ControlConfig(
     AxisLimits(-3600.0, 3600.0, QUICK, QUICK),
@@ -57,15 +59,22 @@ def angles_of(vectors: Array) -> tuple[Array, Array]:
     return az_deg, np.degrees(np.arcsin(np.clip(vectors[2], -1.0, 1.0)))
 
 
+@cache
 def great_circle(el_deg: float, course_deg: float, sky_deg_s: float = SKY_DEG_S) -> Prediction:
     """Through azimuth 100 deg at NOW, at an elevation, on a course."""
     ahead, right, up = frame(100.0, el_deg)
     forward = np.sin(np.radians(course_deg)) * right + np.cos(np.radians(course_deg)) * up
     t = STEP_S * np.arange(-1500, 1501)
-    far = np.radians(sky_deg_s * t)
-    az, el = angles_of(np.outer(ahead, np.cos(far)) + np.outer(forward, np.sin(far)))
+    far, speed = np.radians(sky_deg_s * t), np.radians(sky_deg_s)
+    places = np.outer(ahead, np.cos(far)) + np.outer(forward, np.sin(far))
+    motion = speed * (np.outer(forward, np.cos(far)) - np.outer(ahead, np.sin(far)))
+    az, el = angles_of(places)
     az += 100.0 - az[1500]
-    rates = np.gradient(az, STEP_S, edge_order=2), np.gradient(el, STEP_S, edge_order=2)
+    flat = places[0] ** 2 + places[1] ** 2
+    rates = (
+        np.degrees((motion[0] * places[1] - places[0] * motion[1]) / flat),
+        np.degrees(motion[2] / np.sqrt(flat)),
+    )
     return Prediction(NOW + t[0], STEP_S, az, el, *rates, az, rates[0], "TLE", NOW)
 
 
@@ -83,6 +92,11 @@ def off_path(el_deg: float, course_deg: float, along_deg: float, across_deg: flo
 def apart_deg(one: tuple[float, float], other: tuple[float, float]) -> float:
     first, second = frame(*one)[0], frame(*other)[0]
     return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(first, second)), first @ second)))
+
+
+def scale_of(el_deg: float) -> float:
+    """Degrees on the sky of a degree of azimuth."""
+    return max(abs(float(np.cos(np.radians(el_deg)))), LEAST_SCALE)
 
 
 # The frame of the track
@@ -113,7 +127,7 @@ def test_a_place_beside_the_path_is_where_the_vectors_say_and_is_told_as_what_it
 def test_the_search_crosses_a_beam_in_its_time_at_every_elevation(el_deg: float, course_deg: float, side: int) -> None:
     path = great_circle(el_deg, course_deg)
     pace = pace_s_s(Scan(model=Model.ELEMENTS, side=side), path, NOW, CONFIG)
-    assert pace * SKY_DEG_S == pytest.approx(CONFIG.beamwidth_deg / DWELL_S, rel=0.01)
+    assert pace * SKY_DEG_S == pytest.approx(CONFIG.beamwidth_deg / DWELL_S, rel=0.01 if el_deg < 89.5 else 0.03)
 
 
 @el_places
@@ -202,7 +216,7 @@ def test_autotrack_that_is_still_selected_goes_on_within_five_degrees_on_the_sky
             assert (Cause.STILL_SELECTED in causes(path, place, TrackState.IDLE, SELECTED, 1.0)) == goes_on
 
 
-@pytest.mark.parametrize("el_deg", [20.0, 40.0, 60.0, 75.0])
+@pytest.mark.parametrize("el_deg", [20.0, 40.0, 60.0, 74.0])
 @courses
 def test_what_is_held_beside_the_path_is_ours_as_far_as_the_search_would_look(el_deg: float, course_deg: float) -> None:
     path = great_circle(el_deg, course_deg)
@@ -225,7 +239,7 @@ def test_p6_an_azimuth_is_judged_by_its_angle_on_the_sky(el_deg: float, side: in
     wide = AxisLimits(-270.0, 270.0, 20.0, 10.0)
     bounds = Bounds(1.0, 2.0)
     scale = sky_scale(el_deg)
-    assert scale == pytest.approx(abs(np.cos(np.radians(el_deg))), abs=1e-9)
+    assert scale == pytest.approx(scale_of(el_deg), abs=1e-9)
     status = replace(IN_REMOTE, el_deg=el_deg)
     for share, is_wrong in ((0.9, False), (1.1, True)):
         off_deg = side * share * bounds.error_deg / scale
@@ -246,7 +260,7 @@ def test_p6_an_azimuth_is_judged_by_its_angle_on_the_sky(el_deg: float, side: in
 def test_a_status_is_doubted_and_confirmed_by_its_angle_on_the_sky(el_deg: float, side: int) -> None:
     drive = AxisLimits(-270.0, 270.0, 2.0, 10.0)
     here = Status(100.0, el_deg, AcuMode.STANDBY)
-    cos_el = np.cos(np.radians(el_deg))
+    cos_el = scale_of(el_deg)
     for share, is_believed in ((0.9, True), (1.1, False)):
         doubt = Judge(drive, drive)
         doubt.believes(here, NOW)
@@ -262,7 +276,7 @@ def test_a_status_is_doubted_and_confirmed_by_its_angle_on_the_sky(el_deg: float
 @el_places
 @pytest.mark.parametrize("side", [-1, 1])
 def test_an_encoder_is_frozen_once_the_satellite_has_moved_so_far_on_the_sky(el_deg: float, side: int) -> None:
-    cos_el = np.cos(np.radians(el_deg))
+    cos_el = scale_of(el_deg)
     status = Status(100.0, el_deg, AcuMode.AUTOTRACK)
     for moved_deg, is_frozen in ((0.9 * FROZEN_DEG, False), (1.1 * FROZEN_DEG, True)):
         path = Pointing(100.0, el_deg, side * moved_deg / cos_el, 0.0)  # in a second
@@ -272,7 +286,7 @@ def test_an_encoder_is_frozen_once_the_satellite_has_moved_so_far_on_the_sky(el_
         assert (watch.problem == "azimuth encoder frozen") == is_frozen
 
 
-@pytest.mark.parametrize("el_deg", [5.0, 30.0, 50.0, 65.0, 78.0, 85.0])
+@pytest.mark.parametrize("el_deg", [5.0, 30.0, 50.0, 65.0, 78.0, 85.0, 89.0])
 @pytest.mark.parametrize("side", [-1, 1])
 def test_an_azimuth_that_comes_to_its_path_enters_the_beam_as_slowly_at_every_elevation(
     el_deg: float, side: int
@@ -317,4 +331,4 @@ def test_an_antenna_is_as_fast_as_it_moves_on_the_sky(el_deg: float, course_deg:
     for k in range(21):
         at = path.at(NOW + 0.1 * k)
         motion.add(Reading(NOW + 0.1 * k, at.az_deg % 360.0, at.el_deg, False))
-    assert motion.speed_deg_s(NOW + 2.0) == pytest.approx(0.05, rel=0.05)
+    assert motion.speed_deg_s(NOW + 2.0) == pytest.approx(0.05, rel=0.05 if el_deg < 89.5 else 0.1)
