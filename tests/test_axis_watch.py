@@ -80,6 +80,39 @@ def test_p6_angle_and_time_are_those_of_the_configuration(bounds: Bounds) -> Non
     assert runs.after_s == pytest.approx(bounds.error_deg / 2.0 + bounds.error_s, abs=0.25)
 
 
+def in_turn(wrong_s: float, good_s: float, wrong: float, good: float) -> list[float]:
+    """The one for so long, then the other, five times over."""
+    return ([wrong] * round(wrong_s / TICK_S) + [good] * round(good_s / TICK_S)) * 5
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize(("wrong_s", "is_found"), [(1.9, False), (2.3, True)])
+def test_p6_each_stray_from_where_it_stands_has_its_time_anew(side: int, wrong_s: float, is_found: bool) -> None:
+    strays = [0.0] * 5 + in_turn(wrong_s, 0.2, 1.3 * side, 0.0)
+    assert (judge(strays, [None] * len(strays), Duty.STAND) is not None) == is_found
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize(("wrong_s", "is_found"), [(0.4, False), (0.7, True)])
+def test_p6_each_motion_away_from_a_command_has_its_time_anew(side: int, wrong_s: float, is_found: bool) -> None:
+    """Beyond a degree and back to half of one, where it makes no progress either."""
+    patient = Bounds(1.0, 30.0)
+    away = [0.0] * 3 + in_turn(wrong_s, 0.2, -1.3 * side, -0.5 * side)
+    found = judge(away, [3.0 * side - one for one in away], bounds=patient)
+    assert (found is not None) == is_found
+    assert found is None or found.text == "moves away from its command"
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize(("fast_s", "is_found"), [(0.9, False), (1.3, True)])
+def test_p6_each_race_has_its_time_anew(side: int, fast_s: float, is_found: bool) -> None:
+    rates, angle_deg, angles = [0.0] * 3 + in_turn(fast_s, 0.1, 42.5 * side, 10.0 * side), 0.0, []
+    for rate in rates:
+        angle_deg += rate * TICK_S
+        angles.append(angle_deg)
+    assert (judge(angles, [None] * len(angles), Duty.FREE) is not None) == is_found
+
+
 STRETCHES = st.lists(
     st.tuples(
         st.sampled_from(list(Duty)),

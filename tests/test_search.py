@@ -151,6 +151,21 @@ def test_an_antenna_that_stays_a_quarter_of_a_beam_aside_does_not_end_the_search
     assert {0, 1, -1} <= set(scan.covered)
 
 
+def test_each_row_and_side_has_the_whole_patience_for_the_antenna_to_come() -> None:
+    """An antenna a quarter of a beam aside counts as there after 10 s: on each side of each row anew."""
+    aside = searched(PATH, CONFIG, 120.0, antenna=lambda point: (point.az_deg, point.el_deg - 0.25))
+    came_s: list[float] = []
+    began_s, before, is_waiting = 0.0, (0, 0), False
+    for t, scan, _ in aside:
+        if scan.is_aimed and (scan.row, scan.side) != before:
+            began_s, before, is_waiting = t, (scan.row, scan.side), True
+        elif scan.is_moving and is_waiting:
+            came_s.append(t - began_s)
+            is_waiting = False
+    assert len(came_s) >= 6
+    assert all(10.0 <= waited_s < 10.3 for waited_s in came_s), came_s
+
+
 def test_a_search_that_is_taken_up_again_goes_on_where_it_was() -> None:
     whole = [scan for _, scan, _ in searched(PATH, CONFIG, 30.0)]
     again = [scan for _, scan, _ in searched(PATH, CONFIG, 5.0, replace(whole[-1], is_aimed=False))]

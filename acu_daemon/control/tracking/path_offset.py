@@ -34,7 +34,7 @@ def forget_other_pass(state: ControlState, sky: Sky) -> ControlState:
     if sky.plan is None or sky.plan.rise_tai_s == signal.pass_rise_tai_s:
         return state
     if signal.pass_rise_tai_s is not None:
-        state, signal = forget_search(state), Signal(is_offset_refused=signal.is_offset_refused)
+        state, signal = forget_search(state), Signal()
     return replace(state, signal=replace(signal, pass_rise_tai_s=sky.plan.rise_tai_s))
 
 
