@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from script_modules import load
 
 from acu_daemon.config.acu_tables import AcuSection, AxisSection, ElevationSection
-from acu_daemon.config.antenna_tables import MountSection
+from acu_daemon.config.antenna_tables import AtmosphereSection, MountSection
 from acu_daemon.config.onboard_tables import (
     AttitudeSection,
     AzimuthAxis,
@@ -88,6 +88,7 @@ OUT_OF_SAID: dict[str, tuple[type[Section], dict[str, Any]]] = {  # ranges that 
     "AtmosphereSection.pressure_hpa": (
         StationFile, {"station": HERE, "acu": ACU, "atmosphere": {"pressure_hpa": 800.0}},
     ),
+    "AtmosphereSection.weather_udp": (AtmosphereSection, {"weather_udp": "4840"}),
     "MountSection.ca_deg": (MountSection, {"ca_deg": -0.31}),
     "MountSection.npae_deg": (MountSection, {"npae_deg": 0.31}),
     "MountSection.an_deg": (MountSection, {"an_deg": 0.2, "aw_deg": -0.2}),

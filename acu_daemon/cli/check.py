@@ -44,6 +44,7 @@ from acu_daemon.edge.latch import ADVICE, DISARMED, LATCH
 from acu_daemon.edge.leap_seconds_file import leap_seconds_told
 from acu_daemon.edge.link import check_rate, make_link
 from acu_daemon.edge.state_directory import SNAPSHOT, choice_text, folders_in, older_folders, state_path, with_choice
+from acu_daemon.edge.weather import WeatherReader
 from acu_daemon.errors import AcuDaemonError, LinkError, OrbitError, UsageError
 from acu_daemon.model import Site
 from acu_daemon.orbit.passes import find_passes
@@ -120,8 +121,7 @@ def _findings(config: Path, satellite: str | None, now_tai_s: float, state: Path
     if earth.about or earth.warning:
         said = "; ".join(text for text in (earth.about, earth.warning) if text)
         yield Finding(WARN if earth.warning else GO, "Earth orientation", said)
-    if air := station.atmosphere.told(station.site.station):
-        yield Finding(GO, "air", air)
+    yield from _air(config, station, now_tai_s)
     names = [satellite] if satellite else satellite_names(config)
     if not names:
         yield Finding(NO_GO, "satellites", f"{config}/satellites holds no satellite; put a NAME.toml there")
@@ -144,6 +144,13 @@ def _findings(config: Path, satellite: str | None, now_tai_s: float, state: Path
             yield replace(finding, verdict=WARN) if daemon else replace(finding, detail=finding.detail + hint)
         else:
             yield finding
+
+
+def _air(config: Path, station: StationFile, now_tai_s: float) -> Iterator[Finding]:
+    """The air in force, and what is wrong with the weather of the file that [atmosphere] names."""
+    reader = WeatherReader(station.atmosphere, station.site.station, config)
+    if air := reader.now(now_tai_s).told(station.site.station):
+        yield Finding(WARN if reader.problem else GO, "air", "; ".join(one for one in (air, reader.problem) if one))
 
 
 def _held(daemon: OwnDaemon) -> Finding:

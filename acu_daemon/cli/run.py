@@ -37,6 +37,7 @@ from acu_daemon.cli.options import (
     whose_recording,
 )
 from acu_daemon.cli.rehearsal import clock_text, meet_in_rehearsal, met_by_chance
+from acu_daemon.cli.weather_watch import WeatherWatch
 from acu_daemon.config.load import load_station
 from acu_daemon.config.to_settings import control_config, estimator_settings
 from acu_daemon.control.state import ControlState
@@ -157,9 +158,10 @@ def command(
             recording = ends.enter_context(RecordingWriter(record, files, clock.tai_s(), whose))
         older = () if clock.is_rehearsal else older_folders(base, antenna)  # nothing is carried between rehearsals
         frame = RunSetup(config, satellite, clock, link, directory, files, end_s, shadow, older)
-        first = prepare(frame, target)
+        weather = WeatherWatch(config, target, clock.tai_s())
+        first = prepare(frame, weather.on(target))
         runner = ends.enter_context(loop_runner())  # where the system denies even that, another start is refused too
-        outcome = _watched(runner, _run(frame, first, live, recording))
+        outcome = _watched(runner, _run(frame, first, live, recording, weather))
         structlog.get_logger("run").info("run.done", **asdict(outcome))
     if not outcome.is_stopped:
         raise typer.Exit(1)
@@ -305,7 +307,9 @@ def _announce(target: Target, coming: Pass, clock: SystemClock, *, is_shadow: bo
         log.warning("run.disarmed", reason=reason)
 
 
-async def _run(frame: RunSetup, first: Prepared, live: LiveLine | None, recording: RecordingWriter | None) -> Outcome:
+async def _run(
+    frame: RunSetup, first: Prepared, live: LiveLine | None, recording: RecordingWriter | None, weather: WeatherWatch
+) -> Outcome:
     clock, now = frame.clock, first
     notifier = Notifier()
     health = Health(notifier)
@@ -326,7 +330,9 @@ async def _run(frame: RunSetup, first: Prepared, live: LiveLine | None, recordin
     def why_anew(is_waiting: bool, step_s: float) -> str:
         if step_s:
             return f"the system clock was set by {step_s:+.1f} s, and nothing is tracked"
-        return "other elements were taken" if is_waiting and elements.look(now.job.coming) else ""
+        if is_waiting and elements.look(now.job.coming):
+            return "other elements were taken"
+        return "the weather has changed" if is_waiting and weather.look(clock.tai_s()) else ""
 
     def begin(memory: ControlState | None) -> Service:
         nonlocal now
@@ -335,7 +341,7 @@ async def _run(frame: RunSetup, first: Prepared, live: LiveLine | None, recordin
             if abs(clock.follow()) > STEP_S:
                 clock.obey()
                 elements.target = _load(frame.config, frame.name, clock)
-            now = prepare(frame, elements.target, memory)
+            now = prepare(frame, weather.on(elements.target), memory)
         return Service(
             now.job,
             frame.link,
@@ -360,6 +366,7 @@ async def _run(frame: RunSetup, first: Prepared, live: LiveLine | None, recordin
         structlog.get_logger("run").info("signals.ignored", signals=ignored, reason=reason)
     control = ControlSocket(frame.directory, runs.answer)
     await control.open()
+    await weather.open()
     gc.freeze()  # a full collection over the start-up heap would stall a tick by tens of milliseconds
     sync = asyncio.create_task(clock.watch_synchronisation())
     try:
@@ -368,6 +375,7 @@ async def _run(frame: RunSetup, first: Prepared, live: LiveLine | None, recordin
         sync.cancel()
         now.kept.flush()
         await control.close()
+        weather.close()
         notifier.close()
         if live is not None:
             live.clear()

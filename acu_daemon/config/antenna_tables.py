@@ -1,10 +1,13 @@
 """[atmosphere] and [mount] of station.toml: the air that the antenna looks through, and what a survey says of it."""
 
+from collections.abc import Mapping
 from functools import lru_cache
+from typing import Any
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
-from acu_daemon.config.section import Section
+from acu_daemon.config.problems import in_words
+from acu_daemon.config.section import Name, Section
 from acu_daemon.model import Station
 from acu_daemon.pointing.air import Air, refractivity, standard_air
 from acu_daemon.pointing.antenna_model import AntennaModel, refraction_at_45_deg
@@ -40,6 +43,49 @@ class AtmosphereSection(Section):
     humidity_percent: float | None = Field(
         default=None, ge=0, le=100, description="Relative humidity; left out: the standard air's.  Decides the same."
     )
+    weather_file: Name | None = Field(
+        default=None,
+        description=(
+            "A JSON file beside station.toml, or elsewhere, that a weather station keeps: pressure_hpa, temperature_c, "
+            "humidity_percent, utc.  Decides the same, in place of the values here, while it is fresh."
+        ),
+    )
+    weather_udp: Name | None = Field(
+        default=None,
+        json_schema_extra={"range": "ADDRESS:PORT"},
+        description=(
+            "An address of this machine, such as 127.0.0.1:4840, at which datagrams with the same JSON arrive.  "
+            "Decides the same."
+        ),
+    )
+    weather_max_age_s: float = Field(
+        default=3600.0,
+        ge=10,
+        le=86400,
+        description="How old such weather may be; then the values here are used again, with a warning.  Decides that.",
+    )
+
+    @field_validator("weather_udp")
+    @classmethod
+    def _is_address(cls, value: str | None) -> str | None:
+        if value is not None:
+            host, _, port = value.rpartition(":")
+            if not host or not port.isdecimal() or not 1 <= int(port) <= 65535:
+                raise ValueError("expected ADDRESS:PORT, such as 127.0.0.1:4840")
+        return value
+
+    @property
+    def has_live_weather(self) -> bool:
+        return self.has_refraction and (self.weather_file is not None or self.weather_udp is not None)
+
+    def with_weather(self, values: Mapping[str, Any], station: Station) -> "AtmosphereSection":
+        """The table with the weather that a source tells.  ValueError: no weather is like that, and why."""
+        try:
+            told = type(self).model_validate(self.model_dump() | dict(values))
+        except ValidationError as error:
+            raise ValueError("; ".join(in_words(dict(item)) for item in error.errors())) from None
+        told.check(station)
+        return told
 
     @property
     def has_refraction(self) -> bool:
