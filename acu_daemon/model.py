@@ -111,6 +111,20 @@ class Readings:
         agc_db = None if self.agc_db is None else self.agc_db[which]
         return Readings(self.tai_s[which], self.az_deg[which], self.el_deg[which], agc_db)
 
+    def tail(self, newest_s: float) -> "Readings":
+        """The newest ones, over so many seconds."""
+        return self.part(self.tai_s >= self.tai_s[-1] - newest_s - 1e-6)
+
+    @property
+    def span_s(self) -> float:
+        """From the first to the last one; 0 without any."""
+        return float(self.tai_s[-1] - self.tai_s[0]) if len(self) else 0.0
+
+    @property
+    def second_count(self) -> int:
+        """Seconds in which there is a reading."""
+        return int(np.unique(np.floor(self.tai_s)).size)
+
     @staticmethod
     def of(readings: Iterable[Reading]) -> "Readings":
         """Single readings as arrays."""

@@ -28,6 +28,11 @@ def wrap_180(angle_deg: float) -> float:
     return (angle_deg + 180.0) % 360.0 - 180.0
 
 
+def wrap_pi_array(angle_rad: Array) -> Array:
+    """Turn angles of any shape into [-pi, pi) radians."""
+    return (angle_rad + pi) % (2.0 * pi) - pi
+
+
 def wrap_180_array(angle_deg: Array) -> Array:
     """Turn angles of any shape into [-180, 180) degrees."""
     return (angle_deg + 180.0) % 360.0 - 180.0

@@ -322,12 +322,12 @@ def test_without_a_manoeuvre_nothing_is_dropped() -> None:
         assert estimator.notes == []
 
 
-@pytest.mark.parametrize(("step_s", "is_denied"), [(1.0, True), (5.0, True), (15.0, False)])
-def test_a_minute_needs_readings_without_long_gaps(step_s: float, is_denied: bool) -> None:
+@pytest.mark.parametrize(("step_s", "is_rejected"), [(1.0, True), (5.0, True), (15.0, False)])
+def test_a_minute_needs_readings_without_long_gaps(step_s: float, is_rejected: bool) -> None:
     truth, tai_s = manoeuvred(BURN)
     prior = aged_prior(CARRIED, SOURCE, WHERE, SETTINGS, float(tai_s[0]))
     seen = sights(shown(truth, WHERE, np.arange(tai_s[0], tai_s[0] + 120.0, step_s)))
-    assert CarryOverTest(SOURCE, WHERE, SETTINGS, prior).sees(seen) == is_denied
+    assert CarryOverTest(SOURCE, WHERE, SETTINGS, prior).rejects(seen) == is_rejected
 
 
 def test_one_reading_inside_begins_the_minute_again() -> None:
@@ -336,9 +336,9 @@ def test_one_reading_inside_begins_the_minute_again() -> None:
     off, on = (shown(one, WHERE, tai_s[:110]) for one in (truth, TRUTH))
     is_on = np.arange(110) == 55
     mixed = Readings(off.tai_s, np.where(is_on, on.az_deg, off.az_deg), np.where(is_on, on.el_deg, off.el_deg))
-    denial = CarryOverTest(SOURCE, WHERE, SETTINGS, prior)
-    assert (denial.sigmas(sights(mixed)) < 5.0).tolist() == is_on.tolist()
-    assert not denial.sees(sights(mixed))
+    test = CarryOverTest(SOURCE, WHERE, SETTINGS, prior)
+    assert (test.sigmas(sights(mixed)) < 5.0).tolist() == is_on.tolist()
+    assert not test.rejects(sights(mixed))
 
 
 def test_innovations_are_as_large_as_the_prior_says() -> None:

@@ -173,7 +173,7 @@ def test_the_noise_of_an_axis_that_stands_still_is_no_motion_at_any_elevation(el
     axis = AxisLimits(-270.0, 270.0, 1e-6, 1.0)
 
     def reasons(right_deg: float, up_deg: float) -> list[str]:
-        gate = ReadingGate(90.0, 0.03, 0.05, axis, axis)
+        gate = ReadingGate(EstimatorSettings(0.03, 0.05, 90.0, azimuth=axis, elevation=axis))
         az_deg = np.array([10.0, 10.0 + side * right_deg / np.cos(el_deg * DEG)])
         readings = Readings(np.array([0.0, 0.01]), az_deg, np.array([el_deg, el_deg + side * up_deg]))
         return [one.reason for one in gate.split(readings)[1]]

@@ -5,6 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acu_daemon.assist.reading_gate import ABOVE_MAX_ELEVATION, TOO_FAST, Dwell, ReadingGate, locked_readings
+from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import AxisLimits, Reading, Readings
 
 AZIMUTH = AxisLimits(-270.0, 270.0, 20.0, 10.0)
@@ -16,7 +17,7 @@ def _flags(flags: list[bool], step_s: float = 0.1) -> list[Reading]:
 
 
 def _gate() -> ReadingGate:
-    return ReadingGate(80.0, 0.03, 0.03, AZIMUTH, ELEVATION)
+    return ReadingGate(EstimatorSettings(0.03, 0.03, 80.0, azimuth=AZIMUTH, elevation=ELEVATION))
 
 
 def _readings(rows: list[tuple[float, float, float]]) -> Readings:

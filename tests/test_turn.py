@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acu_daemon.control.safety.turn import (
+    AGAINST_COUNT,
     BIT_SCORE,
-    DENIED_COUNT,
     PATIENCE_S,
     PULL_DEG_S,
     PULL_S,
@@ -85,8 +85,8 @@ def test_a_bearing_that_the_counted_turn_does_not_reach_corrects_it_after_some_r
         found.append(az_deg)
     assert found[3] == pytest.approx(truth[3] - 360.0)
     assert found[-1] == pytest.approx(truth[-1])
-    denied = sum(one < -271.0 for one in found)
-    assert denied == DENIED_COUNT - 1
+    against_count = sum(one < -271.0 for one in found)
+    assert against_count == AGAINST_COUNT - 1
     watch, az_deg = TurnWatch(), -268.0
     for place_deg in (-268.0, -273.0, -268.0, -274.0, -269.0):
         watch, az_deg = locate(watch, seen(place_deg, False), WRAP, az_deg)

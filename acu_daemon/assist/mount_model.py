@@ -20,6 +20,7 @@ from acu_daemon.assist.estimators.full.estimated_states import (
 )
 from acu_daemon.assist.estimators.full.path_partials import (
     Curve,
+    covariance_on_sky,
     low_shape,
     moved_site,
     node_times,
@@ -114,9 +115,4 @@ def sky_covariance(propagator: Propagator, tai_s: Array, site: Site, fit: FitRes
     path, partials = _partials_near(propagator.corrected(Correction(*near)), near, site, tuple(nodes.tolist()))
     has_shift = bool(fit.covariance[STATION, STATION].any())
     h = sky_partials(path.at(tai_s), partials.at(tai_s), here, has_shift)
-    moved = np.tensordot(fit.covariance, h, 1)
-    return (
-        np.sum(h[:, 0] * moved[:, 0], axis=0),
-        np.sum(h[:, 0] * moved[:, 1], axis=0),
-        np.sum(h[:, 1] * moved[:, 1], axis=0),
-    )
+    return covariance_on_sky(fit.covariance, h)

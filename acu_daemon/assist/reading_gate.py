@@ -9,7 +9,8 @@ from math import cos, radians, sqrt
 
 import numpy as np
 
-from acu_daemon.model import AxisLimits, Reading, Readings
+from acu_daemon.assist.settings import EstimatorSettings
+from acu_daemon.model import Reading, Readings
 from acu_daemon.units import wrap_180
 
 DWELL = "not acquired for the dwell time yet"
@@ -83,18 +84,11 @@ class ReadingGate:
     A reading that jumped is compared with the last good one, so a jump is believed once the axis could have made it.
     """
 
-    def __init__(
-        self,
-        max_elevation_deg: float,
-        sigma_azimuth_deg: float,
-        sigma_elevation_deg: float,
-        azimuth: AxisLimits | None,
-        elevation: AxisLimits | None,
-    ) -> None:
-        self._max_elevation_deg = max_elevation_deg
-        self._noise_az_deg = _SIGMA_COUNT * sqrt(2.0) * sigma_azimuth_deg
-        self._noise_el_deg = _SIGMA_COUNT * sqrt(2.0) * sigma_elevation_deg
-        self._azimuth, self._elevation = azimuth, elevation
+    def __init__(self, settings: EstimatorSettings) -> None:
+        self._max_elevation_deg = settings.max_fit_elevation_deg
+        self._noise_az_deg = _SIGMA_COUNT * sqrt(2.0) * settings.sigma_azimuth_deg
+        self._noise_el_deg = _SIGMA_COUNT * sqrt(2.0) * settings.sigma_elevation_deg
+        self._azimuth, self._elevation = settings.azimuth, settings.elevation
         self._last: tuple[float, float, float] | None = None
 
     def split(self, readings: Readings) -> tuple[Readings, list[Rejected]]:

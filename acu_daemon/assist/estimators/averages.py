@@ -9,7 +9,6 @@ For a source that moves by secular rates only, that is the paper's propagation o
 """
 
 from collections import deque
-from math import pi
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from acu_daemon.orbit.frames import station_itrs_m
 from acu_daemon.orbit.kepler import osculating_from_state
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.orbit.timescales import gmst_rad
-from acu_daemon.units import Array
+from acu_daemon.units import Array, wrap_pi_array
 
 _FEWEST_INVERSIONS = 3
 
@@ -35,10 +34,6 @@ def _invert(readings: Readings, site: Site, known: KnownElements, radius_m: Arra
         radius_m,
         prior_raan_rad,
     )
-
-
-def _wrap_pi(angle_rad: Array) -> Array:
-    return (angle_rad + pi) % (2.0 * pi) - pi
 
 
 class DeterministicEstimator(BaseEstimator):
@@ -65,8 +60,8 @@ class DeterministicEstimator(BaseEstimator):
         prior = own.raan_rad + self._prior_raan()
         found = _invert(readings, self._site, known, np.linalg.norm(r_m, axis=1), prior)
         return (
-            _wrap_pi(found.raan_rad - own.raan_rad),
-            _wrap_pi(found.mean_anomaly_rad - own.mean_anomaly_rad),
+            wrap_pi_array(found.raan_rad - own.raan_rad),
+            wrap_pi_array(found.mean_anomaly_rad - own.mean_anomaly_rad),
             found.reasons,
         )
 
@@ -112,7 +107,11 @@ class CircularEstimator(DeterministicEstimator):
         zero = np.zeros_like(radius_m)
         prior = own.raan_rad + self._prior_raan()
         found = _invert(readings, self._site, KnownElements(radius_m, zero, own.i_rad, zero), radius_m, prior)
-        return _wrap_pi(found.raan_rad - own.raan_rad), _wrap_pi(found.mean_anomaly_rad - along), found.reasons
+        return (
+            wrap_pi_array(found.raan_rad - own.raan_rad),
+            wrap_pi_array(found.mean_anomaly_rad - along),
+            found.reasons,
+        )
 
     def _average(self, raan: float, mean_anomaly: float) -> None:
         super()._average(raan, mean_anomaly)

@@ -28,13 +28,7 @@ class BaseEstimator(ABC):
         self._source = propagator
         self._site = site
         self._settings = settings
-        self._gate = ReadingGate(
-            settings.max_fit_elevation_deg,
-            settings.sigma_azimuth_deg,
-            settings.sigma_elevation_deg,
-            settings.azimuth,
-            settings.elevation,
-        )
+        self._gate = ReadingGate(settings)
         self.rejected: list[Rejected] = []
         self.notes: list[str] = []
         self.used_count = 0
@@ -109,18 +103,26 @@ def for_people(propagator: Propagator, correction: Correction, tai_s: float, sit
     across_deg: how far the correction of raan moves the satellite out of its orbital plane at tai_s, as an angle on
     the sky of the station at that instant; right of the inertial motion, up being away from the Earth, is positive.
     """
-    times = np.array([tai_s])
-    r_m, v_m_s = propagator.states_teme(times)
-    station_m = teme_from_itrs(station_itrs_m(site.station), times, site.orientation)[0]
-    r, v = r_m[0], v_m_s[0]
-    right = np.cross(v, r)
-    right /= np.linalg.norm(right)
-    shift_m = correction.delta_raan_rad * float(np.cross([0.0, 0.0, 1.0], r) @ right)
-    sight = r - station_m
-    range_m = float(np.linalg.norm(sight))
-    foreshortening = float(np.sqrt(max(0.0, 1.0 - (float(right @ sight) / range_m) ** 2)))
+    r_m, v_m_s = propagator.states_teme(np.array([tai_s]))
+    right = right_of_track(r_m[0], v_m_s[0])
+    shift_m = correction.delta_raan_rad * float(np.cross([0.0, 0.0, 1.0], r_m[0]) @ right)
     along_s = -correction.delta_mean_anomaly_rad / float(mean_motion_rad_s(r_m, v_m_s)[0])
-    return along_s, shift_m * foreshortening / range_m / DEG
+    return along_s, on_the_sky_deg(shift_m, right, r_m[0], tai_s, site)
+
+
+def right_of_track(r_m: Array, v_m_s: Array) -> Array:
+    """Unit vector (3,) across an inertial motion, to the right of it, up being away from the Earth."""
+    right = np.cross(v_m_s, r_m)
+    unit: Array = right / np.linalg.norm(right)
+    return unit
+
+
+def on_the_sky_deg(shift_m: float, direction: Array, r_m: Array, tai_s: float, site: Site) -> float:
+    """A shift along a unit vector, of a satellite at r_m (3,), TEME, as an angle on the sky of the station."""
+    sight = r_m - teme_from_itrs(station_itrs_m(site.station), np.array([tai_s]), site.orientation)[0]
+    range_m = float(np.linalg.norm(sight))
+    foreshortening = float(np.sqrt(max(0.0, 1.0 - (float(direction @ sight) / range_m) ** 2)))
+    return shift_m * foreshortening / range_m / DEG
 
 
 def mean_motion_rad_s(r_m: Array, v_m_s: Array) -> Array:

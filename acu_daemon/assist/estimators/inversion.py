@@ -12,7 +12,7 @@ import numpy as np
 
 from acu_daemon.model import Station
 from acu_daemon.orbit.frames import enu_from_itrs
-from acu_daemon.units import Array
+from acu_daemon.units import Array, wrap_pi_array
 
 NO_INTERSECTION = "the line of sight does not meet the orbit's sphere"
 BEYOND_LATITUDE = "the direction lies beyond the orbit's highest latitude"
@@ -98,7 +98,7 @@ def _once(
     lambda_up = np.arcsin(sin_lambda)
     east = sidereal_rad + np.arctan2(y, x)  # eq 8, and theta_g of eqs 9 and 10
     raan_up, raan_down = east - lambda_up, east - (pi - lambda_up)  # eqs 9, 10
-    is_up = np.abs(_wrap_pi(raan_up - prior_raan_rad)) <= np.abs(_wrap_pi(raan_down - prior_raan_rad))
+    is_up = np.abs(wrap_pi_array(raan_up - prior_raan_rad)) <= np.abs(wrap_pi_array(raan_down - prior_raan_rad))
     raan = np.where(is_up, raan_up, raan_down)
     cos_lambda = np.where(is_up, 1.0, -1.0) * np.cos(lambda_up)
     f = np.arctan2(tan_lat, cos_lambda * sin_i) - known.argp_rad  # eq 12
@@ -106,8 +106,4 @@ def _once(
     cos_e = (radius * np.cos(f) + known.a_m * known.e) / known.a_m  # eq 14
     eccentric = np.arctan2(sin_e, cos_e)
     mean_anomaly = eccentric - known.e * np.sin(eccentric)  # eq 15
-    return _wrap_pi(raan), _wrap_pi(mean_anomaly), known.a_m * (1.0 - known.e * np.cos(eccentric)), sin_lambda
-
-
-def _wrap_pi(angle_rad: Array) -> Array:
-    return (angle_rad + pi) % (2.0 * pi) - pi
+    return wrap_pi_array(raan), wrap_pi_array(mean_anomaly), known.a_m * (1.0 - known.e * np.cos(eccentric)), sin_lambda

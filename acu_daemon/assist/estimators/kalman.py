@@ -9,7 +9,7 @@ batch is taken in, the batch is taken again, linearised at the new state.
 """
 
 from dataclasses import dataclass
-from math import pi, sqrt
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ from acu_daemon.assist.settings import EstimatorSettings, KalmanTuning
 from acu_daemon.model import Correction, Readings, Site
 from acu_daemon.orbit.frames import enu_from_itrs, itrs_from_teme, station_itrs_m
 from acu_daemon.orbit.propagator import Propagator
-from acu_daemon.units import DEG, Array
+from acu_daemon.units import DEG, Array, wrap_pi_array
 
 _BATCH_COUNT = 50
 _MAX_SWEEPS = 8
@@ -109,8 +109,7 @@ class KalmanEstimator(BaseEstimator):
     def _use(self, readings: Readings) -> list[str | None]:
         reasons: list[str | None] = []
         for k in range(0, len(readings), _BATCH_COUNT):
-            part = slice(k, k + _BATCH_COUNT)
-            reasons += self._take(Readings(readings.tai_s[part], readings.az_deg[part], readings.el_deg[part]))
+            reasons += self._take(readings.part(slice(k, k + _BATCH_COUNT)))
         return reasons
 
     def _take(self, batch: Readings) -> list[str | None]:
@@ -142,7 +141,7 @@ def sweep(
     estimate, last_tai_s, outlier_count = state.estimate, state.tai_s, state.outlier_count
     reasons: list[str | None] = []
     cos_el = np.maximum(np.cos(np.radians(readings.el_deg)), _LEAST_COS_EL)
-    az_off = (np.radians(readings.az_deg) - line.az + pi) % (2.0 * pi) - pi
+    az_off = wrap_pi_array(np.radians(readings.az_deg) - line.az)
     el_off = np.radians(readings.el_deg) - line.el
     columns = (readings.tai_s, cos_el, az_off, el_off, line.az_by_raan, line.az_by_mean_anomaly)
     rows = zip(*(x.tolist() for x in (*columns, line.el_by_raan, line.el_by_mean_anomaly)), strict=True)

@@ -11,8 +11,8 @@ from math import sqrt
 import numpy as np
 
 from acu_daemon.assist.estimators.full.estimated_states import ORBIT, ORBIT_COUNT, states_of
-from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
-from acu_daemon.assist.screening.offsets import angles_deg, offsets
+from acu_daemon.assist.screening.offsets import angles_deg
+from acu_daemon.assist.screening.orbit_test import fitted
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings
 from acu_daemon.errors import OrbitError
 from acu_daemon.model import Correction, Readings, Site
@@ -82,15 +82,13 @@ def needed(source: Propagator, site: Site, settings: EstimatorSettings, readings
     moved = _Ahead(source, -along_s * rate_rad_s)
     sigmas = _of_a_manoeuvre(rate_rad_s)
     wide = replace(settings, orbit_sigmas=sigmas, azimuth=None, elevation=None, station_sigma_m=0.0)
-    estimator = FullEstimator(moved, site, wide)
-    estimator.add(few)
     try:
-        fit = estimator.fit()
-        if fit is None:
-            return None
-        seen = offsets(moved, site, replace(fit, covariance=None), few, wide)
+        found = fitted(moved, site, wide, few)
     except (OrbitError, np.linalg.LinAlgError):
         return Needed(along_s, np.inf, 0.0)
+    if found is None:
+        return None
+    fit, seen = found
     x = states_of(fit.correction, fit.bias, fit.station_shift_enu_m)[ORBIT]
     late_s = along_s + fit.along_s
     of_clock_rad = EARTH_RATE_RAD_S * late_s

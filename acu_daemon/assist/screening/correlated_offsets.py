@@ -20,7 +20,7 @@ BEFORE_S = 120.0
 LAGS = (1, 2, 3, 4)  # slow readings of a fast axis change their sign from one to the next
 FACTOR = 2.0  # of the noise squared, and of what the readings believed show
 REACH = 2.0  # times as far off as is near an axis may hunt
-TURNING_S, TURNING_SHARE = 20.0, 0.3  # so much of the wander is left without its trend: an axis that hunts
+TURNING_S, TURNING_SHARE = 20.0, 0.3  # so much of them is left without their trend: an axis that hunts
 LONGEST_S = 75.0  # then such readings are better than none
 _NONE = Readings.of([])
 
@@ -34,7 +34,7 @@ def correlated_deg2(seen: Offsets) -> float:
 class CorrelatedOffsets:
     """Takes readings off the path by little, oldest first.  Mutable; one owner.
 
-    reason: of the newest readings, "" while they do not wander.  begin_tai_s: since when the newest ones do.
+    reason: of the newest readings, "" while they are not correlated.  begin_tai_s: since when the newest ones are.
     """
 
     def __init__(self, orbit_test: OrbitTest, settings: EstimatorSettings) -> None:
@@ -45,20 +45,20 @@ class CorrelatedOffsets:
         self.begin_tai_s = np.inf
 
     def is_within(self, seen: Offsets) -> Flags:
-        """Which readings to ask about: the near ones; while others wander, those farther off too."""
+        """Which readings to ask about: the near ones; while others are correlated, those farther off too."""
         within: Flags = seen.angle_deg <= (REACH if self.reason else 1.0) * seen.near_deg
         return within
 
     def take(self, readings: Readings) -> None:
-        """Take the next readings that `denies` asks about."""
+        """Take the next readings that `are_correlated` asks about."""
         recent = Readings.joined([self._recent, readings])
         count = max(WINDOW_COUNT, int(np.count_nonzero(recent.tai_s > recent.tai_s[-1] - TURNING_S)), len(readings))
         self._recent = recent.part(slice(-count, None))
 
-    def denies(self, kept: Readings, offsets_of: Callable[[Readings], Offsets]) -> bool:
-        """Say whether the newest readings wander.  offsets_of: from the fit to the kept ones.
+    def are_correlated(self, kept: Readings, offsets_of: Callable[[Readings], Offsets]) -> bool:
+        """Say whether the newest offsets are correlated.  offsets_of: from the fit to the kept ones.
 
-        Where they wander about the path as it was extrapolated, the orbit through them and those kept decides.
+        Where they are about the path as it was extrapolated, the orbit through them and those kept decides.
         """
         tai_s = self._recent.tai_s
         newest_count = max(WINDOW_COUNT, int(np.count_nonzero(tai_s > tai_s[-1] - WINDOW_S)))
@@ -98,13 +98,13 @@ class CorrelatedOffsets:
         count = np.arange(square.size, 0, -1)
         later = np.cumsum(square[::-1])[::-1] / count
         cost = np.cumsum(square) - square + count * (1.0 + np.log(np.maximum(later, 1.0)))
-        wandering = seen.part(slice(int(np.argmin(cost)), None))
-        first_tai_s = float(wandering.tai_s[0])
-        right, up = wandering.drift_deg_s(WINDOW_S)
+        correlated = seen.part(slice(int(np.argmin(cost)), None))
+        first_tai_s = float(correlated.tai_s[0])
+        right, up = correlated.drift_deg_s(WINDOW_S)
         if self.reason != OFF_PATH or right == up == 0.0:
             return first_tai_s
-        off = float(np.mean(wandering.right_deg) * right + np.mean(wandering.up_deg) * up)
-        on_path_tai_s = float(np.mean(wandering.tai_s)) - off / (right * right + up * up)
+        off = float(np.mean(correlated.right_deg) * right + np.mean(correlated.up_deg) * up)
+        on_path_tai_s = float(np.mean(correlated.tai_s)) - off / (right * right + up * up)
         return min(max(on_path_tai_s, first_tai_s - WINDOW_S), first_tai_s)
 
 

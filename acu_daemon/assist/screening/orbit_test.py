@@ -4,7 +4,7 @@ Another satellite moves at other rates, so no small change of our elements goes 
 that are wrong along the track by degrees are still ours.
 """
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
 from acu_daemon.assist.screening.offsets import Offsets, offsets
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings, StateSigmas
 from acu_daemon.errors import OrbitError
-from acu_daemon.model import Readings, Site
+from acu_daemon.model import FitResult, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
 
 NEAR_SHARE = 0.9  # of the readings must lie near the orbit that fits them
@@ -27,16 +27,23 @@ def widened(source: Propagator, settings: EstimatorSettings, factor: float) -> E
     if isinstance(sigmas, StateSigmas):
         wide: ElementSigmas | StateSigmas = StateSigmas(factor * sigmas.position_m, factor * sigmas.velocity_m_s)
     else:
-        wide = ElementSigmas(
-            raan_deg=factor * sigmas.raan_deg,
-            mean_anomaly_deg=min(factor, SURE_ALONG) * sigmas.mean_anomaly_deg,
-            mean_motion_rad_min=factor * sigmas.mean_motion_rad_min,
-            mean_motion_per_day_rad_min=factor * sigmas.mean_motion_per_day_rad_min,
-            e_vector=factor * sigmas.e_vector,
-            e_vector_per_day=factor * sigmas.e_vector_per_day,
-            inclination_deg=factor * sigmas.inclination_deg,
-        )
+        along_deg = min(factor, SURE_ALONG) * sigmas.mean_anomaly_deg
+        wide = replace(ElementSigmas(*(factor * sigma for sigma in astuple(sigmas))), mean_anomaly_deg=along_deg)
     return replace(settings, orbit_sigmas=wide, azimuth=None, elevation=None)
+
+
+def fitted(
+    source: Propagator, site: Site, settings: EstimatorSettings, readings: Readings
+) -> tuple[FitResult, Offsets] | None:
+    """The orbit that fits readings, and their offsets from it; None without one.
+
+    The fit's own sigma is left out of what counts as near: it would excuse what the fit cannot explain.
+    Raises:  OrbitError: the source has no answer for one of the times.
+    """
+    estimator = FullEstimator(source, site, settings)
+    estimator.add(readings)
+    fit = estimator.fit()
+    return None if fit is None else (fit, offsets(source, site, replace(fit, covariance=None), readings, settings))
 
 
 class OrbitTest:
@@ -47,17 +54,11 @@ class OrbitTest:
 
     def best_offsets(self, readings: Readings, factor: float) -> Offsets | None:
         """Offsets from the orbit that fits the readings, its sigmas factor times as large; None without one."""
-        settings = widened(self._source, self._settings, factor)
-        estimator = FullEstimator(self._source, self._site, settings)
         try:
-            estimator.add(readings)
-            fit = estimator.fit()
-            if fit is None:
-                return None
-            # the fit's own sigma would excuse what it cannot explain
-            return offsets(self._source, self._site, replace(fit, covariance=None), readings, settings)
+            found = fitted(self._source, self._site, widened(self._source, self._settings, factor), readings)
         except (OrbitError, np.linalg.LinAlgError):
             return None
+        return None if found is None else found[1]
 
     def verdict(self, before: Readings | None, questioned: Readings, factor: float) -> Offsets | None:
         """Offsets of the questioned readings from the orbit that fits, or None: no orbit near the elements does."""
@@ -77,12 +78,10 @@ class OrbitTest:
         Infinite where the most likely orbit does not go through them.
         Raises:  OrbitError: the source has no answer for one of the times.
         """
-        estimator = FullEstimator(self._source, self._site, self._settings)
-        estimator.add(readings)
-        fit = estimator.fit()
-        if fit is None:
+        found = fitted(self._source, self._site, self._settings, readings)
+        if found is None:
             return 0.0
-        seen = offsets(self._source, self._site, replace(fit, covariance=None), readings, self._settings)
+        fit, seen = found
         if float(np.mean(seen.is_near)) < NEAR_SHARE:
             return np.inf
         x = states_of(fit.correction, fit.bias, fit.station_shift_enu_m)

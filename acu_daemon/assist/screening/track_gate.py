@@ -6,8 +6,8 @@ A reading near the path of the fit is kept.  Readings off it wait: they are kept
 goes through them and the readings kept before (the path was extrapolated badly), and they take the place of those kept
 before once they alone have obeyed such an orbit for long enough (what was believed first was wrong).  Before anything
 is kept, readings are the satellite's if an orbit near the elements goes through them.  A track that leaves the path
-without a jump takes with it what was kept since it left.  Readings near the path that wander about it, as those of an
-axis that hunts, are left out.
+without a jump takes with it what was kept since it left.
+Readings near the path whose offsets are correlated, as those of an axis that hunts, are left out.
 """
 
 from collections import Counter
@@ -17,7 +17,6 @@ from functools import partial
 import numpy as np
 
 from acu_daemon.assist.reading_gate import ACCELERATION, BELIED, OFF_PATH, WRONG_TARGET, ReadingGate
-from acu_daemon.assist.reading_spans import seconds, span_s, tail_of
 from acu_daemon.assist.screening.correlated_offsets import CorrelatedOffsets
 from acu_daemon.assist.screening.off_path_reason import LOW_DB, is_weak_beside, left_path_tai_s, reason_of, rise_db
 from acu_daemon.assist.screening.offsets import Offsets, offsets
@@ -60,13 +59,7 @@ class TrackGate:
 
     def __init__(self, source: Propagator, site: Site, settings: EstimatorSettings) -> None:
         self._source, self._site, self._settings = source, site, settings
-        self._plain = ReadingGate(
-            settings.max_fit_elevation_deg,
-            settings.sigma_azimuth_deg,
-            settings.sigma_elevation_deg,
-            settings.azimuth,
-            settings.elevation,
-        )
+        self._plain = ReadingGate(settings)
         self._orbit_test = OrbitTest(source, site, settings)
         self._correlated = CorrelatedOffsets(self._orbit_test, settings)
         self._kept: list[Readings] = []
@@ -162,8 +155,8 @@ class TrackGate:
         if self._trial_s:
             trials.append((max(WIDE_AFTER_S, self._trial_s), WIDE))
         for trial_s, factor in trials:
-            tail = tail_of(self._waiting, trial_s or WAITING_S)
-            if span_s(self._waiting) >= trial_s and (seen := self._orbit_test.verdict(None, tail, factor)) is not None:
+            tail = self._waiting.tail(trial_s or WAITING_S)
+            if self._waiting.span_s >= trial_s and (seen := self._orbit_test.verdict(None, tail, factor)) is not None:
                 self._waiting_reason = WRONG_TARGET
                 return self._believe(tail, seen)
         self._trial_s = max(self._trial_s, FIRST_TRIAL_S)
@@ -183,7 +176,7 @@ class TrackGate:
         seen = self._offsets(self._waiting, fit)
         self._waiting_reason = reason_of(seen, rise_db(self.kept, off), self._settings.beamwidth_deg)
         is_rebuilt = False
-        off_s = span_s(self._waiting)
+        off_s = self._waiting.span_s
         if self._taken_back is None and off_s >= SUSTAINED_S:
             self._taken_back = _NONE
             is_rebuilt = self._take_back(seen, fit)
@@ -192,21 +185,23 @@ class TrackGate:
                 return Taken(is_rebuilt=True)
         elif off_s >= CLEAR_S:
             is_rebuilt = self._give_back(fit)
-        tail = tail_of(self._waiting, TAIL_S)
-        if (judged := self._orbit_test.verdict(tail_of(self.kept, JUDGED_S), tail, NARROW)) is not None:
+        tail = self._waiting.tail(TAIL_S)
+        if (judged := self._orbit_test.verdict(self.kept.tail(JUDGED_S), tail, NARROW)) is not None:
             return self._believe(tail, judged)
         return Taken(near, is_rebuilt or self._resets())
 
     def _is_correlated(self, asked: Readings, fit: FitResult) -> bool:
-        """Whether the readings, with those before them, wander about the path; a fit to few cannot tell."""
+        """Whether the readings, with those before them, are correlated about the path; a fit to few cannot tell."""
         if len(asked) == 0:
             return False
         self._correlated.take(asked)
         path = replace(fit, covariance=None)  # its sigma is of no use here, and slow
-        return seconds(self.kept) >= YOUNG_S and self._correlated.denies(self.kept, partial(self._offsets, fit=path))
+        return self.kept.second_count >= YOUNG_S and self._correlated.are_correlated(
+            self.kept, partial(self._offsets, fit=path)
+        )
 
     def _leave_correlated(self, off: Readings, fit: FitResult) -> Taken:
-        """Leave out what was kept of the window that wanders; go on with the readings farther off."""
+        """Leave out what was kept of the window that is correlated; go on with the readings farther off."""
         is_theirs = self.kept.tai_s >= self._correlated.begin_tai_s
         has_some = self._leave_out(self.kept.part(is_theirs), self._correlated.reason) > 0
         self._kept = [self.kept.part(~is_theirs)]
@@ -221,7 +216,7 @@ class TrackGate:
         is_jump = float(np.hypot(*step_deg)) > JUMP_BEAMS * self._settings.beamwidth_deg
         if is_jump or seen.tai_s[0] - last.tai_s[0] > BREAK_S:
             return False
-        if seconds(kept) < YOUNG_S:
+        if kept.second_count < YOUNG_S:
             self._trial_s = min(max(FIRST_TRIAL_S, 2.0 * self._trial_s), LAST_TRIAL_S)
             self._waiting = Readings.joined([kept, self._waiting])
             self._kept = []
@@ -251,17 +246,17 @@ class TrackGate:
         if self._waiting.tai_s[-1] < self._reset_tai_s + RESET_EVERY_S:
             return False
         self._reset_tai_s = float(self._waiting.tai_s[-1])
-        needed_s = min(max(RESET_SHARE * seconds(self.kept), least_s), most_s)
-        if span_s(self._waiting) < least_s:
+        needed_s = min(max(RESET_SHARE * self.kept.second_count, least_s), most_s)
+        if self._waiting.span_s < least_s:
             return False
         rise = rise_db(self.kept, self._waiting)
         if (rise is None and self._are_kept_strained()) or (rise is not None and rise > HIGH_DB):
             needed_s = least_s
         elif rise is not None and rise < -LOW_DB:
             needed_s *= 2.0
-        if span_s(self._waiting) < needed_s:
+        if self._waiting.span_s < needed_s:
             return False
-        tail = tail_of(self._waiting, needed_s)
+        tail = self._waiting.tail(needed_s)
         judged = self._orbit_test.verdict(None, tail, NARROW)
         if judged is None:
             return False
@@ -273,5 +268,5 @@ class TrackGate:
 
     def _are_kept_strained(self) -> bool:
         """Whether the orbit through the kept readings is much less likely than the one through those that wait."""
-        of_kept, of_waiting = (self._orbit_test.strain(tail_of(one, STRAIN_S)) for one in (self.kept, self._waiting))
+        of_kept, of_waiting = (self._orbit_test.strain(one.tail(STRAIN_S)) for one in (self.kept, self._waiting))
         return of_kept - STRAIN > of_waiting

@@ -11,7 +11,6 @@ from acu_daemon.assist.estimators.estimator import Estimator, EstimatorSettings,
 from acu_daemon.assist.estimators.full.carry_over import CarryOver, aged_prior, first_fit
 from acu_daemon.assist.estimators.full.full_estimator import FullEstimator, shift_for_people
 from acu_daemon.assist.reading_gate import OUTLIER
-from acu_daemon.assist.reading_spans import span_s
 from acu_daemon.assist.screening.track_gate import TrackGate
 from acu_daemon.assist.session.model_choice import ModelChoice, choose, is_good, newest_residual_deg
 from acu_daemon.assist.session.prediction import predict
@@ -23,7 +22,7 @@ from acu_daemon.pointing.keyhole import follow_path, longest_window_s
 BATCH_S = 1.0  # readings are judged by the fit to those before them: so many at a time
 BATCH_SHARE = 0.1  # or this share of what was taken already, such as when a new child is given a whole pass
 RESTART_S = 30.0  # a fit that is bad again and again starts afresh with the newest readings
-CARRIED_S = 10.0  # so long its readings must deny what it began with
+CARRIED_S = 10.0  # so long its readings must contradict what it began with
 DROPPED = "the last pass's orbit is dropped: the fits that began with it stayed far from the newest readings"
 
 
@@ -102,7 +101,7 @@ class Refitter:
         notes = self._take_notes()
         models = self._models(request.now_tai_s)
         self._choose(models, has_news=len(request.readings) > 0)
-        if self._choice.is_reset_due and (self._carried is None or span_s(self._gate.kept) >= CARRIED_S):
+        if self._choice.is_reset_due and (self._carried is None or self._gate.kept.span_s >= CARRIED_S):
             notes += self._drop_carried()
             self._gate.restart(RESTART_S)
             self._begin_fit()
@@ -112,9 +111,7 @@ class Refitter:
 
     def _batches(self, readings: Readings) -> Iterator[Readings]:
         while len(readings):
-            kept = self._gate.kept
-            taken_s = float(kept.tai_s[-1] - kept.tai_s[0]) if len(kept) else 0.0
-            is_now = readings.tai_s < readings.tai_s[0] + max(BATCH_S, BATCH_SHARE * taken_s)
+            is_now = readings.tai_s < readings.tai_s[0] + max(BATCH_S, BATCH_SHARE * self._gate.kept.span_s)
             yield readings.part(is_now)
             readings = readings.part(~is_now)
 
@@ -136,7 +133,7 @@ class Refitter:
         return (DROPPED,) if is_last_pass else ()
 
     def _forget_resumed(self) -> None:
-        """What this pass's newer readings deny is not gone on from."""
+        """What this pass's newer readings contradict is not gone on from."""
         if self._resumed is not None:
             self._resumed = self._carried = None
 
@@ -155,7 +152,7 @@ class Refitter:
 
     def _take_notes(self) -> tuple[str, ...]:
         notes, self._estimator.notes[:] = tuple(self._estimator.notes), ()
-        if notes:  # the readings denied what was carried over
+        if notes:  # the readings rejected what was carried over
             self._carried = self._resumed = None
         new = tuple(note for note in notes if note not in self._said)  # an estimator made afresh finds the same again
         self._said.update(new)

@@ -31,7 +31,7 @@ from acu_daemon.model import AxisLimits
 from acu_daemon.pointing.wrap import END_SLACK_DEG, encoder_continuous, is_one_turn, middle_deg, nearest_turn, turns_of
 from acu_daemon.units import wrap_180
 
-SURE_COUNT, DENIED_COUNT = 10, 5
+SURE_COUNT, AGAINST_COUNT = 10, 5
 BIT_MARGIN_DEG = 3.0  # so near to the middle the bit may be either
 BIT_SCORE = 20  # of readings that belie the bit (2 each, -1 for one that does not): from then on it tells nothing
 PULL_DEG_S, PULL_S = 1.0, 0.5  # so fast, for so long: no noise
@@ -57,7 +57,7 @@ class TurnWatch:
 
     is_sure: bool = False
     sure_count: int = 0  # of readings in a row that show the turn, as far as SURE_COUNT
-    denied_count: int = 0  # of readings in a row that deny it
+    against_count: int = 0  # of readings in a row against it
     bit_score: int = 0
     wrong_half: int | None = None  # the half of the range in which the bit was found wrong; None: it is believed
     phase: Phase = Phase.BELIEVED
@@ -88,17 +88,17 @@ class TurnWatch:
 def locate(watch: TurnWatch, status: Status, limits: AxisLimits, near_deg: float | None) -> tuple[TurnWatch, float]:
     """Where the azimuth is, continuous.  near_deg: where it was a moment ago; None: not known, or not to be relied on.
 
-    What denies the turn that was counted is believed after DENIED_COUNT readings in a row: beside the zenith the noise
-    of an azimuth is many degrees.  What the bit says is compared with the turn, and counted.
+    What speaks against the turn that was counted is believed after AGAINST_COUNT readings in a row: beside the zenith
+    the noise of an azimuth is many degrees.  What the bit says is compared with the turn, and counted.
     """
     end = int(status.is_at_cw_limit) - int(status.is_at_ccw_limit)
     az_deg = encoder_continuous(status.az_deg, status.is_sector_high, limits, near_deg=near_deg, end=end)
     if near_deg is not None:
         counted_deg = near_deg + wrap_180(status.az_deg - near_deg)
-        is_denied = abs(az_deg - counted_deg) > 180.0
-        denied_count = (watch.denied_count + 1) % DENIED_COUNT if is_denied else 0
-        az_deg = counted_deg if is_denied and denied_count else az_deg
-        watch = watch if denied_count == watch.denied_count else replace(watch, denied_count=denied_count)
+        is_against = abs(az_deg - counted_deg) > 180.0
+        against_count = (watch.against_count + 1) % AGAINST_COUNT if is_against else 0
+        az_deg = counted_deg if is_against and against_count else az_deg
+        watch = watch if against_count == watch.against_count else replace(watch, against_count=against_count)
     if is_one_turn(limits):
         return watch, az_deg
     watch = _judge_bit(watch, status, az_deg, limits)

@@ -7,14 +7,20 @@ import numpy as np
 
 from acu_daemon.assist.estimators.full.estimated_states import STATION, Prior
 from acu_daemon.assist.estimators.full.normal_points import Sights, residuals
-from acu_daemon.assist.estimators.full.path_partials import node_times, orbit_partials_itrs, site_of, sky_partials
+from acu_daemon.assist.estimators.full.path_partials import (
+    covariance_on_sky,
+    node_times,
+    orbit_partials_itrs,
+    site_of,
+    sky_partials,
+)
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import Site
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import Array
 
 WIDEST_SIGMAS = 5.0
-DENIED_S = 60.0  # as long as every reading lies beyond
+REJECTED_S = 60.0  # as long as every reading lies beyond
 LEAST_READINGS = 10  # so many of them
 LONGEST_GAP_S = 10.0  # a minute with a longer gap between two readings is no minute of readings
 
@@ -29,8 +35,8 @@ class CarryOverTest:
         self._prior = prior
         self._beyond: list[float] = []  # times of the newest readings without one inside between them
 
-    def sees(self, seen: Sights) -> bool:
-        """Take new readings, oldest first; say whether a minute of them denies the prior.
+    def rejects(self, seen: Sights) -> bool:
+        """Take new readings, oldest first; say whether a minute of them rejects the prior.
 
         Raises:  OrbitError: the source has no answer for one of their times.
         """
@@ -40,7 +46,7 @@ class CarryOverTest:
                 self._beyond = []
             if sigmas > WIDEST_SIGMAS:
                 self._beyond.append(tai_s)
-            if len(self._beyond) >= LEAST_READINGS and tai_s - self._beyond[0] >= DENIED_S:
+            if len(self._beyond) >= LEAST_READINGS and tai_s - self._beyond[0] >= REJECTED_S:
                 return True
         return False
 
@@ -53,10 +59,8 @@ class CarryOverTest:
         noise = np.square(left.noise_rad / left.noise_scale[:, None])
         has_shift = bool(prior.covariance[STATION, STATION].any())
         h = sky_partials(path.at(seen.tai_s), partials.at(seen.tai_s), here, has_shift)
-        moved = np.tensordot(prior.covariance, h, 1)
-        across = np.sum(h[:, 0] * moved[:, 0], axis=0) + noise[0]
-        both = np.sum(h[:, 0] * moved[:, 1], axis=0)
-        upward = np.sum(h[:, 1] * moved[:, 1], axis=0) + noise[1]
+        across, both, upward = covariance_on_sky(prior.covariance, h)
+        across, upward = across + noise[0], upward + noise[1]
         x, y = left.off_rad
         sigmas: Array = np.sqrt((x * x * upward - 2.0 * both * x * y + y * y * across) / (across * upward - both**2))
         return sigmas

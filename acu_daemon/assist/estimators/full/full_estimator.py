@@ -4,9 +4,9 @@ from dataclasses import fields
 
 import numpy as np
 
-from acu_daemon.assist.estimators.estimator_base import BaseEstimator
+from acu_daemon.assist.estimators.estimator_base import BaseEstimator, on_the_sky_deg, right_of_track
 from acu_daemon.assist.estimators.full.carry_over import CarryOver, aged_prior
-from acu_daemon.assist.estimators.full.carry_over_test import DENIED_S, WIDEST_SIGMAS, CarryOverTest
+from acu_daemon.assist.estimators.full.carry_over_test import REJECTED_S, WIDEST_SIGMAS, CarryOverTest
 from acu_daemon.assist.estimators.full.elements_discrepancy import describe_discrepancy
 from acu_daemon.assist.estimators.full.estimated_states import Prior, bias_of, correction_of, make_prior, shift_of
 from acu_daemon.assist.estimators.full.least_squares import Batch, Solution, solve
@@ -14,7 +14,6 @@ from acu_daemon.assist.estimators.full.normal_points import Sights, sights
 from acu_daemon.assist.estimators.full.prior_inflation import WIDTHS, is_strained, most_likely
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import Correction, FitResult, Readings, Site
-from acu_daemon.orbit.frames import station_itrs_m, teme_from_itrs
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import DEG
 
@@ -36,7 +35,7 @@ class FullEstimator(BaseEstimator):
         *,
         may_widen: bool = False,
     ) -> None:
-        """Take what an earlier pass left; it is dropped, with a note, when a minute of readings denies it.
+        """Take what an earlier pass left; it is dropped, with a note, when a minute of readings rejects it.
 
         may_widen: elements are worth less, with a note, when the readings show them to be far worse than they should
         be; only for readings that are known to be the satellite's.
@@ -61,11 +60,11 @@ class FullEstimator(BaseEstimator):
         seen = sights(readings)
         if self._batch is None:
             self._start(float(readings.tai_s[0]))
-        if self._carry_over_test is not None and self._carry_over_test.sees(seen):
+        if self._carry_over_test is not None and self._carry_over_test.rejects(seen):
             self._carried = self._carry_over_test = None
             self._start(float((self._parts or [seen])[0].tai_s[0]))
             self.notes.append(
-                f"the last pass's orbit is dropped: for {DENIED_S:g} s all readings were more than {WIDEST_SIGMAS:g} "
+                f"the last pass's orbit is dropped: for {REJECTED_S:g} s all readings were more than {WIDEST_SIGMAS:g} "
                 "sigma from it, as after a manoeuvre"
             )
         self._parts.append(seen)
@@ -153,11 +152,6 @@ def shift_for_people(source: Propagator, correction: Correction, tai_s: float, s
     at = np.array([tai_s])
     (r0, v0), (r1, v1) = (one.states_teme(at) for one in (source, source.corrected(correction)))
     r, v, move = r1[0], v1[0], (r1 - r0)[0]
-    right = np.cross(v, r)
-    right /= np.linalg.norm(right)
-    sight = r - teme_from_itrs(station_itrs_m(site.station), at, site.orientation)[0]
-    range_m = float(np.linalg.norm(sight))
-    foreshortening = float(np.sqrt(max(0.0, 1.0 - (float(right @ sight) / range_m) ** 2)))
-    middle = (v0[0] + v) / 2.0
+    right, middle = right_of_track(r, v), (v0[0] + v) / 2.0
     along_s = -float(move @ middle) / float(middle @ middle)
-    return along_s, float(move @ right) * foreshortening / range_m / DEG
+    return along_s, on_the_sky_deg(float(move @ right), right, r, tai_s, site)

@@ -150,6 +150,20 @@ def sky_partials(r_itrs_m: Array, orbit_itrs: Array, site: Site, has_shift: bool
     return out
 
 
+def covariance_on_sky(covariance: Array, partials: Array) -> tuple[Array, Array, Array]:
+    """Covariance of directions, (N,) each, rad^2: across the elevation, both together, in elevation.
+
+    covariance: (13, 13), of the states; partials: (13, 2, N), `sky_partials`.
+    """
+    moved = np.tensordot(covariance, partials, 1)
+    across, upward = partials[:, 0], partials[:, 1]
+    return (
+        np.sum(across * moved[:, 0], axis=0),
+        np.sum(across * moved[:, 1], axis=0),
+        np.sum(upward * moved[:, 1], axis=0),
+    )
+
+
 def low_shape(site: Site, sin_el: Array, cos_el: Array, range_m: Array) -> tuple[Array, Array]:
     """What a unit of the bias el_cot moves in elevation, and its derivative by that, 1 / deg: AngleBias."""
     if site.antenna is not None and site.antenna.has_air:
