@@ -6,7 +6,19 @@ from typing import Any
 
 import pytest
 import test_tick
-from acu_daemon.protocol.messages import (
+from memories import remembering
+from test_tick import AZ_DEG, EL_DEG, FITTED, NOW, PLAN, SKY, ready, saw, status
+
+from acu_daemon.control.extra_exchange import EXTRA_REPEAT_S
+from acu_daemon.control.safety.axis_watch import AxesWatch, AxisSeen, AxisWatch, Duty
+from acu_daemon.control.safety.encoder_watch import EncoderWatch
+from acu_daemon.control.safety.turn import Phase, TurnWatch
+from acu_daemon.control.state import ControlState, Held, Lag, PathOffset, Scan, Sent, StartStage, Watchdog
+from acu_daemon.control.tick import tick
+from acu_daemon.control.tick_input import Exchange, Observation, Request, Sky, TickInput
+from acu_daemon.control.tracking.lag import LagEstimate
+from acu_daemon.control.tracking.state_table import TrackState
+from acu_daemon.drivers.sa3842.messages import (
     Ack,
     AcuMode,
     Backup,
@@ -22,18 +34,6 @@ from acu_daemon.protocol.messages import (
     Stop,
     WriteParameter,
 )
-from memories import remembering
-from test_tick import AZ_DEG, EL_DEG, FITTED, NOW, PLAN, SKY, ready, saw, status
-
-from acu_daemon.control.extra_exchange import EXTRA_REPEAT_S
-from acu_daemon.control.safety.axis_watch import AxesWatch, AxisSeen, AxisWatch, Duty
-from acu_daemon.control.safety.encoder_watch import EncoderWatch
-from acu_daemon.control.safety.turn import Phase, TurnWatch
-from acu_daemon.control.state import ControlState, Held, Lag, PathOffset, Scan, Sent, StartStage, Watchdog
-from acu_daemon.control.tick import tick
-from acu_daemon.control.tick_input import Exchange, Observation, Request, Sky, TickInput
-from acu_daemon.control.tracking.lag import LagEstimate
-from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.model import Model, Reading
 from acu_daemon.pointing.axis import AxisState
 
