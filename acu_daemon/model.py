@@ -60,6 +60,12 @@ class Antenna(Protocol):
     def refraction_shape(self, el_deg: Array, range_m: npt.ArrayLike) -> tuple[Array, Array]: ...
 
 
+class Horizon(Protocol):
+    """What stands around a station, above which the sky is seen: pointing.skyline.  Degrees, (N,)."""
+
+    def heights_deg(self, az_deg: Array) -> Array: ...
+
+
 @dataclass(frozen=True, slots=True)
 class Site:
     """A station together with the Earth orientation in force, and its antenna; None: a perfect one in a vacuum.
@@ -71,6 +77,7 @@ class Site:
     orientation: EarthOrientation = EarthOrientation()
     has_light_time: bool = False
     antenna: Antenna | None = None
+    skyline: Horizon | None = None  # None: a level one, the lowest elevation
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Sky
 from acu_daemon.drivers.sa3842.messages import RegisterContents, Status, WriteAndPoll, WriteRegisters
 from acu_daemon.model import AxisLimits, FitResult, Prediction, Reading
+from acu_daemon.pointing.envelope import Envelope
 
 
 @dataclass(frozen=True)
@@ -34,8 +35,9 @@ class Mirror:
     def config(self, config: ControlConfig) -> ControlConfig:
         return replace(
             config,
-            azimuth=self.limits(config.azimuth, self.az, self.turned_deg),
-            elevation=self.limits(config.elevation, self.el),
+            envelope=Envelope(
+                self.limits(config.azimuth, self.az, self.turned_deg), self.limits(config.elevation, self.el)
+            ),
         )
 
     def status(self, status: Status) -> Status:

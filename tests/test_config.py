@@ -1,5 +1,6 @@
 """TOML files: what loads, every default, and every kind of mistake in an operator's words."""
 
+import re
 import tempfile
 from pathlib import Path
 
@@ -354,3 +355,42 @@ def test_the_rooms_get_what_the_files_say(tmp_path: Path) -> None:
     assert (settings.max_fit_elevation_deg, settings.sigma_azimuth_deg) == (70, 0.02)
     assert settings.azimuth == control.azimuth
     assert (station.site.station.latitude_deg, station.site.station.height_m) == (-15.53, 277.0)
+
+
+def test_the_envelope_gets_what_the_files_say(tmp_path: Path) -> None:
+    (tmp_path / "hills.csv").write_text("az_deg,el_deg\n# from a panorama\n0, 5\n90, 12.5\n\n180, 3\n")
+    more = (
+        '[envelope]\nmask = "hills.csv"\nsun_policy = "avoid"\nsun_keep_out_deg = 3\n'
+        '[[envelope.keep_out]]\nname = "the mast"\naz_from_deg = 350\naz_to_deg = 10\nel_to_deg = 20\n'
+        "[mount]\nia_deg = 1.5\n"
+    )
+    write(tmp_path, STATION + more, scd=BROUWER)
+    satellite, station = load_satellite(tmp_path, "scd", load_station(tmp_path))
+    envelope = control_config(station, satellite, 0.0).envelope
+    assert envelope.skyline == station.site.skyline
+    assert envelope.skyline is not None
+    assert envelope.skyline.height_deg(45.0) == pytest.approx(8.75)
+    assert envelope.why_not(1.5, 10.0, 8e8) == "within the keep-out of the mast"
+    assert envelope.why_not(-9.0 + 1.5, 10.0, 8e8) == "within the keep-out of the mast"
+    assert envelope.why_not(12.0, 10.0, 8e8) == ""
+    assert envelope.sun is not None
+    assert (envelope.sun.radius_deg, envelope.sun.policy) == (3.0, "avoid")
+    assert envelope.mount is not None
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("mask = 5", "envelope.mask = 5: expected a CSV file beside station.toml"),
+        ("mask = [[0, 5], [0, 6]]", "azimuth 0 has two elevations"),
+        ('mask = "none.csv"', "none.csv: cannot be read: No such file or directory; it is [envelope] mask"),
+        ('mask = "bad.csv"', "bad.csv, line 2: '90 12': expected az_deg,el_deg"),
+        ("stow_az_deg = 5", "expected stow_az_deg and stow_el_deg both, or neither"),
+        ('sun_policy = "ignore"', "envelope.sun_policy = \"ignore\": expected 'avoid', 'warn' or 'off'"),
+    ],
+)
+def test_what_is_wrong_with_the_envelope_is_said_with_its_place(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "bad.csv").write_text("0,5\n90 12\n")
+    write(tmp_path, f"{STATION}[envelope]\n{text}\n")
+    with pytest.raises(ConfigError, match=re.escape(said)):
+        load_station(tmp_path)

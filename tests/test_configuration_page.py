@@ -12,6 +12,7 @@ from script_modules import load
 
 from acu_daemon.config.acu_tables import AcuSection, AxisSection, ElevationSection
 from acu_daemon.config.antenna_tables import AtmosphereSection, MountSection
+from acu_daemon.config.envelope_tables import EnvelopeSection, KeepOutSection
 from acu_daemon.config.onboard_tables import (
     AttitudeSection,
     AzimuthAxis,
@@ -89,6 +90,8 @@ OUT_OF_SAID: dict[str, tuple[type[Section], dict[str, Any]]] = {  # ranges that 
         StationFile, {"station": HERE, "acu": ACU, "atmosphere": {"pressure_hpa": 800.0}},
     ),
     "AtmosphereSection.weather_udp": (AtmosphereSection, {"weather_udp": "4840"}),
+    "EnvelopeSection.mask": (EnvelopeSection, {"mask": [[10.0, 5.0, 3.0]]}),
+    "KeepOutSection.el_to_deg": (KeepOutSection, {"az_from_deg": 0.0, "az_to_deg": 9.0, "el_to_deg": -90.0}),
     "MountSection.ca_deg": (MountSection, {"ca_deg": -0.31}),
     "MountSection.npae_deg": (MountSection, {"npae_deg": 0.31}),
     "MountSection.an_deg": (MountSection, {"an_deg": 0.2, "aw_deg": -0.2}),

@@ -88,7 +88,7 @@ def test_an_encoder_that_shows_one_code_is_excused_by_a_switch_of_its_own_axis_a
 def test_a_switch_shows_the_end_at_which_the_antenna_is_whatever_the_sector_bit_says(
     is_high: bool, switch: str, limits: tuple[float, float], place_deg: float
 ) -> None:
-    config = replace(CONFIG, azimuth=AxisLimits(*limits, 20.0, 10.0))
+    config = replace(CONFIG, envelope=replace(CONFIG.envelope, azimuth=AxisLimits(*limits, 20.0, 10.0)))
     at_end = replace(status(AcuMode.STANDBY, is_sector_high=is_high, **{switch: True}), az_deg=place_deg % 360.0)
     assert tick(ControlState(), TickInput(saw(at_end), Sky(), NOW), config)[0].intake.az_deg == pytest.approx(place_deg)
     for other in set(ENDS) - {switch}:  # no switch at the other end, and none of the elevation, says so

@@ -25,6 +25,7 @@ from acu_daemon.daemon.motion import Motion
 from acu_daemon.drivers.sa3842.messages import AcuMode, Backup, Status
 from acu_daemon.model import AxisLimits, Model, Pointing, Prediction, Reading
 from acu_daemon.pointing.axis import AxisState
+from acu_daemon.pointing.envelope import Envelope
 from acu_daemon.units import Array, wrap_180
 
 ELEVATIONS_DEG = (2.0, 20.0, 40.0, 60.0, 74.0, 85.0, 89.0, 89.9)
@@ -35,8 +36,7 @@ STEP_S = 0.02  # fine: close to the zenith an azimuth has corners
 LEAST_SCALE = 0.01  # of a degree of azimuth on the sky: nearer than half a degree to the zenith it is all noise
 QUICK = 1e5  # of a drive that sets no limit here
 CONFIG = ControlConfig(
-    AxisLimits(-3600.0, 3600.0, QUICK, QUICK),
-    AxisLimits(-90.0, 180.0, QUICK, QUICK),
+    Envelope(AxisLimits(-3600.0, 3600.0, QUICK, QUICK), AxisLimits(-90.0, 180.0, QUICK, QUICK)),
     min_elevation_deg=-90.0,
     search_along_s=14.0,
     search_across_deg=8.0,
@@ -292,7 +292,7 @@ def test_an_azimuth_that_comes_to_its_path_enters_the_beam_as_slowly_at_every_el
     el_deg: float, side: int
 ) -> None:
     """Half a beam in no less than 1.2 s, from its edge to the satellite."""
-    config = ControlConfig(AxisLimits(-270.0, 270.0, 20.0, 20.0), AxisLimits(0.0, 90.0, 5.0, 5.0), beamwidth_deg=1.0)
+    config = ControlConfig(Envelope(AxisLimits(-270.0, 270.0, 20.0, 20.0), AxisLimits(0.0, 90.0, 5.0, 5.0)))
     cos_el = float(np.cos(np.radians(el_deg)))
     status = replace(IN_REMOTE, az_deg=100.0, el_deg=el_deg)
     register, left_deg = AxisState(100.0 - side * 6.0 / cos_el), [6.0]

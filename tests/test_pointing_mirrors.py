@@ -16,6 +16,7 @@ from acu_daemon.control.tracking.approach import way_s
 from acu_daemon.control.tracking.scan import go_on, pace_s_s, pointing
 from acu_daemon.model import AxisLimits, Model, Reading
 from acu_daemon.pointing.axis import AxisState, step
+from acu_daemon.pointing.envelope import Envelope
 from acu_daemon.pointing.keyhole import follow_path
 from acu_daemon.pointing.reach import out_of_reach
 from acu_daemon.pointing.wrap import (
@@ -185,7 +186,7 @@ def test_a_row_of_the_search_is_mirrored_with_its_path(
 ) -> None:
     """Right of a motion is left of the mirrored one."""
     config = ControlConfig(
-        AxisLimits(-270.0, 270.0, 5.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0), min_elevation_deg=-90.0
+        Envelope(AxisLimits(-270.0, 270.0, 5.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0)), min_elevation_deg=-90.0
     )
     path = straight_path(40.0, el_rate_deg_s=rates_deg_s[1], az_rate_deg_s=rates_deg_s[0])
     other_path, other_config = mirror.prediction(path), mirror.config(config)

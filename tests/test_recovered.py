@@ -38,8 +38,9 @@ from acu_daemon.drivers.sa3842.messages import (
     WriteRegisters,
 )
 from acu_daemon.model import Correction, FitResult, Pointing, Prediction, Reading
+from acu_daemon.pointing.envelope import Envelope
 
-CONFIG = ControlConfig(AZIMUTH, ELEVATION)
+CONFIG = ControlConfig(Envelope(AZIMUTH, ELEVATION))
 NOW, PERIOD_S = 8.4e8, 0.1
 BEGIN, TICKS = 20, 320
 CODE_DEG = 360.0 / 65536.0

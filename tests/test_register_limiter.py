@@ -15,8 +15,9 @@ from acu_daemon.control.tracking.register_limiter import limit
 from acu_daemon.drivers.sa3842.messages import AcuMode, Status
 from acu_daemon.model import AxisLimits, Pointing
 from acu_daemon.pointing.axis import AxisState
+from acu_daemon.pointing.envelope import Envelope
 
-CONFIG = ControlConfig(AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0))
+CONFIG = ControlConfig(Envelope(AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0)))
 DT_S = 0.1
 RATE_TOLERANCE_DEG = 0.006  # one 16-bit code
 CHASE_S = 5.0  # is enough for 3 degrees, at any rate of the path here
@@ -142,7 +143,7 @@ def test_the_antennas_own_rate_is_known_at_every_period(period_s: float) -> None
     assert passed.az.position_deg == pytest.approx(here.az_deg, abs=RATE_TOLERANCE_DEG)
 
 
-NARROW = replace(CONFIG, azimuth=replace(CONFIG.azimuth, min_deg=-150.0, max_deg=150.0))
+NARROW = replace(CONFIG, envelope=replace(CONFIG.envelope, azimuth=AxisLimits(-150.0, 150.0, 20.0, 10.0)))
 
 
 @pytest.mark.parametrize("is_followed", [True, False])
@@ -163,7 +164,7 @@ def test_p5_an_azimuth_that_no_turn_reaches_is_held_at_the_nearer_end_and_the_el
 
 @pytest.mark.parametrize("is_followed", [True, False])
 def test_p5_an_elevation_outside_its_limits_is_held_at_the_nearer_one_and_the_azimuth_follows(is_followed) -> None:
-    flat = replace(CONFIG, elevation=replace(CONFIG.elevation, min_deg=7.0, max_deg=66.0))
+    flat = replace(CONFIG, envelope=replace(CONFIG.envelope, elevation=AxisLimits(7.0, 66.0, 5.0, 5.0)))
     for el_deg, held_deg in ((67.4, 66.0), (5.0, 7.0)):
         state = at(100.0, held_deg, 2.0)
         passed = limit(Pointing(100.2, el_deg, 2.0, 0.0), state, 0.0, is_followed=is_followed, dt_s=DT_S, config=flat)

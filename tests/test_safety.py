@@ -403,18 +403,18 @@ DANGEROUS: tuple[Command, ...] = (
     ids=["disarmed", "latched", "not started", "local panel", "no status", "shadow"],
 )
 def test_p5_no_order_passes_the_fence_where_it_has_no_business(command, change, config) -> None:
-    assert refusal(command, remembering(moving(), **change), config)
+    assert refusal(command, remembering(moving(), **change), NOW, config)
 
 
 @pytest.mark.parametrize("command", [Stow(), ResetFault(), ClearChange(), SelectBackup(Backup.RATE)], ids=str)
 def test_p5_what_the_daemon_never_orders_never_passes(command: Command) -> None:
-    assert refusal(command, moving(), CONFIG) == "not in its place"
+    assert refusal(command, moving(), NOW, CONFIG) == "not in its place"
 
 
 @given(st.floats(), st.floats(), st.sampled_from([WriteAndPoll, WriteRegisters]))
 def test_p5_no_register_write_outside_the_limits_passes(az_deg, el_deg, kind) -> None:
     is_inside = -270.01 <= az_deg <= 270.01 and -0.01 <= el_deg <= 90.01
-    assert is_inside or refusal(kind(az_deg, el_deg), moving(), CONFIG)
+    assert is_inside or refusal(kind(az_deg, el_deg), moving(), NOW, CONFIG)
 
 
 @given(
@@ -455,7 +455,7 @@ def check_fence(state: ControlState, seen: Observation, sky: Sky, *, is_shadow: 
     after, orders = tick(state, TickInput(seen, sky, NOW), config)
     assert after.refusals.refusal_count == state.refusals.refusal_count  # the fence had nothing to keep back
     for command in (orders.first, orders.extra):
-        assert command is None or refusal(command, after, config) == ""
+        assert command is None or refusal(command, after, NOW, config) == ""
     check_hands(after, orders, config)
 
 

@@ -36,9 +36,10 @@ from acu_daemon.control.tracking.scan import (
 )
 from acu_daemon.control.tracking.track_frame import extents
 from acu_daemon.model import AxisLimits, Model, Pointing, Prediction, Reading
+from acu_daemon.pointing.envelope import Envelope
 from acu_daemon.sim.scenario import SkyErrors
 
-CONFIG = ControlConfig(AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0))
+CONFIG = ControlConfig(Envelope(AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0)))
 RATE_DEG_S = 0.5
 PERIOD_S = 0.1
 SEEN_BEAMS = 0.5
@@ -109,7 +110,11 @@ def test_the_path_is_searched_to_both_ends_before_anything_beside_it_and_within_
 
 @given(st.floats(0.05, 3.0), st.floats(0.3, 3.0), st.floats(1.0, 20.0))
 def test_no_row_is_searched_faster_than_the_beam_or_the_drives_allow(rate: float, beam: float, drive: float) -> None:
-    config = replace(CONFIG, beamwidth_deg=beam, azimuth=AxisLimits(-270.0, 270.0, drive, 10.0))
+    config = replace(
+        CONFIG,
+        beamwidth_deg=beam,
+        envelope=replace(CONFIG.envelope, azimuth=AxisLimits(-270.0, 270.0, drive, 10.0)),
+    )
     path = straight_path(30.0, 0.0, rate)
     for side in (-1, 1):
         scan = Scan(side=side, is_aimed=True)
@@ -126,7 +131,7 @@ def test_no_row_is_searched_faster_than_the_beam_or_the_drives_allow(rate: float
 def test_the_search_never_looks_below_the_mask_nor_beyond_a_limit_and_counts_nothing_there(
     el_deg: float, el_rate_deg_s: float
 ) -> None:
-    config = replace(CONFIG, elevation=AxisLimits(0.0, 89.0, 5.0, 5.0))
+    config = replace(CONFIG, envelope=replace(CONFIG.envelope, elevation=AxisLimits(0.0, 89.0, 5.0, 5.0)))
     path = straight_path(el_deg, el_rate_deg_s, 0.4 if el_deg < 80.0 else 0.05)
     seen = list(searched(path, config, 100.0))
     assert all(5.0 <= point.el_deg <= 89.0 for _, _, point in seen)

@@ -30,8 +30,9 @@ from acu_daemon.drivers.sa3842.messages import (
 )
 from acu_daemon.drivers.sa3842.status_block import decode_status
 from acu_daemon.model import AxisLimits
+from acu_daemon.pointing.envelope import Envelope
 
-CONFIG = ControlConfig(AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0))
+CONFIG = ControlConfig(Envelope(AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0)))
 AZ_DEG, EL_DEG = 22464 * LSB_DEG, 10322 * LSB_DEG  # angles an encoder can show, near 123.4 and 56.7
 NOW = 1000.0  # TAI
 READS = (Identify, ReadRegisters, ReadParameter)
@@ -164,7 +165,7 @@ def is_inside(az_deg: float, el_deg: float) -> bool:
 
 @pytest.mark.parametrize("az_deg", [0.0, -0.001, 359.999, -179.9, 180.0])
 def test_the_read_back_holds_through_north_and_at_any_turn(az_deg: float) -> None:
-    wide = replace(CONFIG, azimuth=replace(CONFIG.azimuth, min_deg=-400.0, max_deg=400.0))
+    wide = replace(CONFIG, envelope=replace(CONFIG.envelope, azimuth=AxisLimits(-400.0, 400.0, 20.0, 10.0)))
     assert start(standing(az_deg), SmallAcu(), wide).startup.stage is StartStage.READY
 
 

@@ -40,8 +40,9 @@ from acu_daemon.drivers.sa3842.messages import (
 )
 from acu_daemon.model import AxisLimits, Prediction, Reading
 from acu_daemon.pointing.axis import AxisState
+from acu_daemon.pointing.envelope import Envelope
 
-CONFIG = ControlConfig(AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0))
+CONFIG = ControlConfig(Envelope(AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0)))
 NOW = 8.4e8
 AZ_DEG, EL_DEG, AZ_RATE, EL_RATE = 100.0, 40.0, 0.5, 0.3
 LEAD_S = CONFIG.effect_delay_s + CONFIG.period_s / 2
@@ -355,7 +356,7 @@ def test_p5_what_the_gate_refuses_is_counted_every_time_and_logged_once() -> Non
 
 def test_p5_in_search_too_an_elevation_beyond_its_limits_is_held_there_told_and_counted() -> None:
     held = status(AcuMode.REMOTE_BACKUP)
-    flat = replace(CONFIG, elevation=replace(CONFIG.elevation, max_deg=38.0))
+    flat = replace(CONFIG, envelope=replace(CONFIG.envelope, elevation=replace(CONFIG.elevation, max_deg=38.0)))
     state, told = remembering(ready(TrackState.SEARCH, held), axis_el=AxisState(38.0)), []
     for k in range(10):
         state, orders = tick(state, TickInput(saw(held), FITTED, NOW + 0.1 * k), flat)
@@ -373,7 +374,7 @@ def test_p5_in_search_too_an_elevation_beyond_its_limits_is_held_there_told_and_
 def test_p5_an_axis_outside_its_limits_is_held_there_and_the_other_one_follows(mode: AcuMode) -> None:
     """Counted with every write, told once for each edge, and not at once again when it comes and goes."""
     held = status(mode)
-    flat = replace(CONFIG, elevation=replace(CONFIG.elevation, max_deg=38.0))
+    flat = replace(CONFIG, envelope=replace(CONFIG.envelope, elevation=replace(CONFIG.elevation, max_deg=38.0)))
     track = TrackState.HOLD_FITTED if mode is AcuMode.REMOTE_BACKUP else TrackState.AUTOTRACK_FITTED
     state, told = remembering(ready(track, held), hold_from_tai_s=NOW, axis_el=AxisState(38.0)), []
     within = replace(FITTED, prediction=replace(path("FITTED"), el_deg=path().el_deg - 5.0))
@@ -398,7 +399,7 @@ def test_p5_what_the_gate_holds_back_is_counted() -> None:
 
 def test_p5_what_the_fence_keeps_back_is_counted_and_logged_and_a_poll_goes_in_its_place() -> None:
     state = ready(TrackState.HOLD_FITTED, status(AcuMode.REMOTE_BACKUP))
-    after, orders = permit(state, Orders(WriteAndPoll(100.0, 91.0), Stow()), CONFIG)
+    after, orders = permit(state, Orders(WriteAndPoll(100.0, 91.0), Stow()), NOW, CONFIG)
     assert (orders.first, orders.extra) == (Poll(), None)
     assert after.refusals.refusal_count == 2
     assert [event.name for event in orders.events] == ["fence.refused", "fence.refused"]

@@ -17,6 +17,7 @@ from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Request, Sky, TickInput
 from acu_daemon.drivers.sa3842.messages import AcuMode, Nak, SelectMode, Status, Stop, Stow
 from acu_daemon.model import AxisLimits, Correction, FitResult, Model, Prediction, Reading
+from acu_daemon.pointing.envelope import Envelope
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.scenario import AcuChoice, Encoder, Scenario
@@ -88,8 +89,7 @@ class TroubledDecision:
         self.random = Random(self.seed)
         draw = self.random
         self.config = ControlConfig(
-            draw.choice(AZIMUTHS),
-            draw.choice(ELEVATIONS),
+            Envelope(draw.choice(AZIMUTHS), draw.choice(ELEVATIONS)),
             min_elevation_deg=-90.0,
             preposition_s=10.0,
             acquire_s=3.0,

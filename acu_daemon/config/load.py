@@ -12,20 +12,55 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import ValidationError
 
+from acu_daemon.config.envelope_tables import Points
 from acu_daemon.config.problems import in_words
 from acu_daemon.config.satellite_tables import SatelliteFile
 from acu_daemon.config.section import Section
 from acu_daemon.config.station_tables import StationFile
 from acu_daemon.errors import ConfigError
+from acu_daemon.pointing.skyline import skyline_of
 
 File = TypeVar("File", bound=Section)
+MASK_HEADER = "az_deg,el_deg"
 _NONE: Mapping[str, type[Section]] = {}
 
 
 def load_station(directory: Path) -> StationFile:
-    """Read DIR/station.toml.  ConfigError: names file, key, value and what was expected."""
+    """Read DIR/station.toml, and the mask that it names.  ConfigError: names file, key, value and what was expected."""
     path = directory / "station.toml"
-    return parse(StationFile, path, read_toml(path))
+    station = parse(StationFile, path, read_toml(path))
+    if not isinstance(station.envelope.mask, str):
+        return station
+    mask = read_mask(directory / station.envelope.mask)
+    return station.model_copy(update={"envelope": station.envelope.model_copy(update={"mask": mask})})
+
+
+def read_mask(path: Path) -> Points:
+    """Read a skyline: lines az_deg,el_deg, a header and lines that begin with # left out.
+
+    ConfigError: names file, line and what was expected.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}; it is [envelope] mask of station.toml") from None
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: byte {error.start}: expected UTF-8 text; save the file in that encoding") from None
+    points: list[tuple[float, float]] = []
+    for number, line in enumerate(lines, start=1):
+        text = line.strip()
+        if not text or text.startswith("#") or (not points and text.lower().replace(" ", "") == MASK_HEADER):
+            continue
+        try:
+            az_deg, el_deg = map(float, text.split(","))
+        except ValueError:
+            raise ConfigError(f"{path}, line {number}: {text[:60]!r}: expected az_deg,el_deg") from None
+        points.append((az_deg, el_deg))
+    try:
+        skyline_of(tuple(points))
+    except ValueError as error:
+        raise ConfigError(f"{path}: {error}") from None
+    return tuple(points)
 
 
 def satellite_names(directory: Path) -> list[str]:

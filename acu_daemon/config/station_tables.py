@@ -6,9 +6,12 @@ from pydantic import Field, model_validator
 
 from acu_daemon.config.acu_tables import AcuSection
 from acu_daemon.config.antenna_tables import AtmosphereSection, MountSection, antenna_of
+from acu_daemon.config.envelope_tables import EnvelopeSection
 from acu_daemon.config.section import Name, Section
 from acu_daemon.config.tracking_tables import ReadingsSection, ReceiverSection, TrackingSection
 from acu_daemon.model import EarthOrientation, Site, Station
+from acu_daemon.pointing.envelope import Envelope
+from acu_daemon.pointing.mount import Mount
 
 
 class StationSection(Section):
@@ -159,6 +162,10 @@ class StationFile(Section):
     safety: SafetySection = Field(
         default=SafetySection(), description="What must hold before and while the antenna moves."
     )
+    envelope: EnvelopeSection = Field(
+        default=EnvelopeSection(),
+        description="What stands around the antenna, and what its beam keeps out of (docs/envelope.md).",
+    )
     atmosphere: AtmosphereSection = Field(
         default=AtmosphereSection(), description="The air that the antenna looks through (docs/antenna-model.md)."
     )
@@ -180,4 +187,17 @@ class StationFile(Section):
     def site(self) -> Site:
         s = self.station
         station = Station(s.name, s.latitude_deg, s.longitude_deg, s.height_m)
-        return Site(station, self.time.orientation, antenna=antenna_of(self.atmosphere, self.mount, station))
+        antenna = antenna_of(self.atmosphere, self.mount, station)
+        return Site(station, self.time.orientation, antenna=antenna, skyline=self.envelope.skyline)
+
+    @property
+    def bounds(self) -> Envelope:
+        """All that bounds where the antenna is moved."""
+        return Envelope(
+            self.acu.azimuth.limits(),
+            self.acu.elevation.limits(),
+            tuple(one.zone() for one in self.envelope.keep_out),
+            self.envelope.sun(self.site),
+            self.envelope.skyline,
+            None if (mount := self.mount.mount()) == Mount() else mount,
+        )

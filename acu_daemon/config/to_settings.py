@@ -17,8 +17,7 @@ def control_config(station: StationFile, satellite: SatelliteFile, byte_time_s: 
     acu = station.acu
     wire_s = 17 * byte_time_s  # a WRITE AND STATUS command: docs/protocol.md, Messages
     return ControlConfig(
-        azimuth=acu.azimuth.limits(),
-        elevation=acu.elevation.limits(),
+        envelope=station.bounds,
         period_s=acu.period_s,
         sample_delay_s=wire_s + acu.device_delay_s,
         poll_sample_delay_s=5 * byte_time_s + acu.device_delay_s,

@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 from acu_daemon.control.safety.axis_watch import Bounds
 from acu_daemon.model import AxisLimits
+from acu_daemon.pointing.envelope import Envelope
 
 
 @dataclass(frozen=True, slots=True)
 class ControlConfig:
     """Everything of the TOML files that the decision of a tick depends on."""
 
-    azimuth: AxisLimits
-    elevation: AxisLimits
+    envelope: Envelope
     period_s: float = 0.1
     sample_delay_s: float = 0.010  # start of WRITE AND STATUS to the sample of the angles: docs/protocol.md, Time tags
     poll_sample_delay_s: float = 0.010  # the same for STATUS POLL
@@ -31,3 +31,11 @@ class ControlConfig:
     register_watchdog_s: float = 0.0  # the ACU's parameter W; 0: it is not touched
     following: Bounds = Bounds()
     clock_alarm_deg: float = 0.1  # an error of UTC counts from here on, at the sky's present rate
+
+    @property
+    def azimuth(self) -> AxisLimits:
+        return self.envelope.azimuth
+
+    @property
+    def elevation(self) -> AxisLimits:
+        return self.envelope.elevation

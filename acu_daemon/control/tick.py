@@ -56,7 +56,7 @@ def tick(state: ControlState, given: TickInput, config: ControlConfig) -> tuple[
     state = learn_of_signal(state, seen, sky, config, events)
     state = search(before, state, seen, sky, now_tai_s, config, events)
     state, orders = order(before, state, seen, sky, now_tai_s, config, events)
-    return permit(state, orders, config)
+    return permit(state, orders, now_tai_s, config)
 
 
 def take_in(

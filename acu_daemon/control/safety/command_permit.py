@@ -34,10 +34,10 @@ READS = (Identify, Poll, ReadRegisters, ReadFaults, ReadParameter)
 SELECTED_MODES = (AcuMode.STANDBY, AcuMode.REMOTE, AcuMode.AUTOTRACK)
 
 
-def permit(state: ControlState, orders: Orders, config: ControlConfig) -> tuple[ControlState, Orders]:
+def permit(state: ControlState, orders: Orders, now_tai_s: float, config: ControlConfig) -> tuple[ControlState, Orders]:
     """Let orders out; a poll goes in the place of a first command that is kept back, nothing in that of an extra."""
-    first_refusal = refusal(orders.first, state, config)
-    extra_refusal = refusal(orders.extra, state, config) if orders.extra is not None else ""
+    first_refusal = refusal(orders.first, state, now_tai_s, config)
+    extra_refusal = refusal(orders.extra, state, now_tai_s, config) if orders.extra is not None else ""
     if not first_refusal and not extra_refusal:
         return state, orders
     events = list(orders.events)
@@ -49,7 +49,7 @@ def permit(state: ControlState, orders: Orders, config: ControlConfig) -> tuple[
     )
 
 
-def refusal(command: Command, state: ControlState, config: ControlConfig) -> str:
+def refusal(command: Command, state: ControlState, now_tai_s: float, config: ControlConfig) -> str:
     """Why a command must not go out; empty: it may."""
     if isinstance(command, READS):
         return ""
@@ -63,16 +63,16 @@ def refusal(command: Command, state: ControlState, config: ControlConfig) -> str
         return "disarmed"
     if state.intake.status is None or not state.intake.status.is_remote_enabled:
         return "the local panel has control"
-    return _of_kind(command, state, config)
+    return _of_kind(command, state, now_tai_s, config)
 
 
-def _of_kind(command: Command, state: ControlState, config: ControlConfig) -> str:
+def _of_kind(command: Command, state: ControlState, now_tai_s: float, config: ControlConfig) -> str:
     stage, is_ready = state.startup.stage, state.startup.stage is StartStage.READY
     match command:
         case WriteAndPoll(az_deg=az_deg, el_deg=el_deg) if is_ready:
-            return _of_angles(az_deg, el_deg, config)
+            return _of_angles(az_deg, el_deg, now_tai_s, config)
         case WriteRegisters(az_deg=az_deg, el_deg=el_deg) if stage >= StartStage.SECTOR_FREE:
-            return _of_angles(az_deg, el_deg, config)
+            return _of_angles(az_deg, el_deg, now_tai_s, config)
         case SelectMode(mode=mode) if is_ready and mode in SELECTED_MODES:
             return ""
         case SelectBackup(backup=Backup.REMOTE) if is_ready:
@@ -82,10 +82,8 @@ def _of_kind(command: Command, state: ControlState, config: ControlConfig) -> st
     return "not in its place"
 
 
-def _of_angles(az_deg: float, el_deg: float, config: ControlConfig) -> str:
-    for name, angle_deg, limits in (("azimuth", az_deg, config.azimuth), ("elevation", el_deg, config.elevation)):
+def _of_angles(az_deg: float, el_deg: float, now_tai_s: float, config: ControlConfig) -> str:
+    for name, angle_deg in (("azimuth", az_deg), ("elevation", el_deg)):
         if not isfinite(angle_deg):
             return f"{name} is not a finite angle"
-        if not limits.min_deg - LSB_DEG <= angle_deg <= limits.max_deg + LSB_DEG:
-            return f"{name} outside {limits.min_deg:g} to {limits.max_deg:g} deg"
-    return ""
+    return config.envelope.why_not(az_deg, el_deg, now_tai_s, LSB_DEG)
