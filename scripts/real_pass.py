@@ -1,9 +1,14 @@
-"""The real passes of ../shared/data/passes as configuration directories, for scripts and tests."""
+"""The real passes of ../shared/data/passes as configuration directories, for scripts and tests.
+
+REAL_PASSES names another folder of such, as scripts/passes_from_orbit.py makes.
+"""
 
 import json
+import os
 from pathlib import Path
 
-PASSES = Path(__file__).resolve().parents[2] / "shared" / "data" / "passes"
+_PASSES = Path(__file__).resolve().parents[2] / "shared" / "data" / "passes"
+PASSES = Path(os.environ.get("REAL_PASSES", _PASSES))
 
 STATION = """\
 [station]

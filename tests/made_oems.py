@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from acu_daemon.model import EarthOrientation
-from acu_daemon.orbit.ephemeris import Ephemeris, OemPropagator
+from acu_daemon.orbit.ephemeris import Ephemeris, EphemerisPropagator
 from acu_daemon.orbit.oem import parse_oem
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
@@ -81,8 +81,8 @@ def xml(*segments: States, **changes: str) -> str:
     return "\n".join([*lines, "</body>", "</oem>"]) + "\n"
 
 
-def source(text: str, orientation: EarthOrientation = NO_ORIENTATION) -> OemPropagator:
+def source(text: str, orientation: EarthOrientation = NO_ORIENTATION) -> EphemerisPropagator:
     """A propagator of a message that must be good."""
     segments, problems = parse_oem(text, "x.oem")
     assert problems == []
-    return OemPropagator(Ephemeris(segments, orientation))
+    return EphemerisPropagator(Ephemeris(segments, orientation))

@@ -83,7 +83,8 @@ def passes(directory: Path, *more: object) -> Done:
         ("<?xml version='1.0'?><error>No GP data</error>", "XML, but no elements: 'No GP data'"),
         ("<html><body>MEAN_MOTION is a field of CCSDS_OMM</body></html>", "a web page, not elements: 'MEAN_MOTION is"),
         ("No GP data found\r\n", "a notice, not elements: 'No GP data found'"),
-        (gzip.compress(ISS.encode()), "a gzip archive: unpack it with gunzip; a file of elements is text"),
+        (gzip.compress(ISS.encode())[:-9], "a gzip archive that was cut: fetch it anew"),
+        (b"\x1f\x9d\x90rest", "a compress archive: unpack it with uncompress; a file of elements is text"),
         (b"PK\x03\x04rest", "a zip archive: unpack it"),
         (b"%PDF-1.7\n%\xe2\xe3", "a PDF document"),
         (b"\x89PNG\r\n", "a picture"),
@@ -109,6 +110,11 @@ def test_whatever_a_file_holds_it_is_named_in_one_line(data: bytes) -> None:
     assert said
     assert "\n" not in said
     assert len(said) < 400
+
+
+def test_a_packed_list_is_read(tmp_path: Path) -> None:
+    done = passes(config(tmp_path, gzip.compress(ISS.encode())))
+    assert (done.code, done.err) == (0, "")
 
 
 def test_text_in_utf_16_is_read(tmp_path: Path) -> None:

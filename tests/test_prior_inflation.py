@@ -14,7 +14,7 @@ from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
 from acu_daemon.assist.estimators.full.prior_inflation import WIDTHS
 from acu_daemon.assist.mount_model import encoder_look, sigma_deg
 from acu_daemon.assist.session.refit import RefitRequest, RefitSetup, Refitter
-from acu_daemon.assist.settings import BROUWER_SIGMAS, OEM_SIGMAS, ElementSigmas, EstimatorSettings, StateSigmas
+from acu_daemon.assist.settings import BROUWER_SIGMAS, EPHEMERIS_SIGMAS, ElementSigmas, EstimatorSettings, StateSigmas
 from acu_daemon.model import AngleBias, AxisLimits, Correction, FitResult, Readings
 from acu_daemon.orbit.look import look_at
 from acu_daemon.units import DAY_S
@@ -112,7 +112,7 @@ def test_each_kind_of_elements_has_sigmas_of_its_own_unless_the_satellites_file_
     assert [plain.sigmas_of(kind) for kind in ("tle", "omm", "oem", "brouwer")] == [
         ElementSigmas(),
         ElementSigmas(),
-        OEM_SIGMAS,
+        EPHEMERIS_SIGMAS,
         BROUWER_SIGMAS,
     ]
     assert GIVEN.sigmas_of("brouwer") == GIVEN.sigmas_of("oem") == StateSigmas(3e3, 3.0)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from math import inf
 
 from acu_daemon.model import AxisLimits
+from acu_daemon.orbit.propagator import EPHEMERIDES
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,14 +51,14 @@ BROUWER_SIGMAS = ElementSigmas(  # no long-period terms (0.4 km a day in the e-v
     e_vector_per_day=6e-5,
     inclination_deg=0.02,
 )
-OEM_SIGMAS = ElementSigmas(  # of an orbit determination; the anomaly is left free for a manoeuvre or a wrong clock
+EPHEMERIS_SIGMAS = ElementSigmas(  # of an orbit determination; the anomaly stays free for a manoeuvre, a wrong clock
     raan_deg=0.005,
     mean_motion_rad_min=1e-7,
     mean_motion_per_day_rad_min=3e-7,
     e_vector=1e-5,
     inclination_deg=0.002,
 )
-_BY_KIND = {"brouwer": BROUWER_SIGMAS, "oem": OEM_SIGMAS}
+_BY_KIND = {"brouwer": BROUWER_SIGMAS, **dict.fromkeys(EPHEMERIDES, EPHEMERIS_SIGMAS)}
 
 
 @dataclass(frozen=True, slots=True)

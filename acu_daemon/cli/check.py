@@ -48,6 +48,7 @@ from acu_daemon.edge.weather import WeatherReader
 from acu_daemon.errors import AcuDaemonError, LinkError, OrbitError, UsageError
 from acu_daemon.model import Site
 from acu_daemon.orbit.passes import find_passes
+from acu_daemon.orbit.propagator import is_ephemeris
 from acu_daemon.orbit.sun import RISEN_EL_DEG, sun_direction_deg
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.orbit.visibility import why_none
@@ -272,12 +273,12 @@ def _next_pass(name: str, target: Target, now_tai_s: float) -> Iterator[Finding]
     lowest_deg = station.station.min_elevation_deg
     propagator = target.elements.propagator
     passes = find_passes(propagator, station.site, now_tai_s, now_tai_s + DAY_S, lowest_deg)
-    is_ephemeris = propagator.kind == "oem"
+    has_spans = is_ephemeris(propagator)
     if not passes:
         until = ending(target, now_tai_s + DAY_S)
         why = "" if until else why_none(propagator, station.site, now_tai_s, now_tai_s + DAY_S, lowest_deg)
         texts = [f"none above {lowest_deg:g} deg within a day", why, until]
-        verdict = NO_GO if until and not is_ephemeris else WARN
+        verdict = NO_GO if until and not has_spans else WARN
         yield Finding(verdict, f"{name}: next pass", "; ".join(text for text in texts if text))
         return
     coming = passes[0]
@@ -290,7 +291,7 @@ def _next_pass(name: str, target: Target, now_tai_s: float) -> Iterator[Finding]
         f"{name}: next pass",
         f"{utc_text(coming.rise_tai_s, 0)}, {lasts}, up to {coming.culmination_el_deg:.1f} deg",
     )
-    if not is_ephemeris and (until := ending(target, now_tai_s + NEXT_PASS_DAYS * DAY_S)):
+    if not has_spans and (until := ending(target, now_tai_s + NEXT_PASS_DAYS * DAY_S)):
         yield Finding(WARN, f"{name}: decay", until)
     azimuth, elevation = station.acu.azimuth.limits(), station.acu.elevation.limits()
     start_tai_s = coming.rise_tai_s

@@ -25,7 +25,7 @@ from acu_daemon.edge.clock import SystemClock
 from acu_daemon.errors import AcuDaemonError, OrbitError, UsageError
 from acu_daemon.model import Pass
 from acu_daemon.orbit.passes import find_passes
-from acu_daemon.orbit.propagator import spans_tai_s
+from acu_daemon.orbit.propagator import is_ephemeris, spans_tai_s
 from acu_daemon.orbit.selection import nearest_epoch_tai_s
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.orbit.visibility import why_none
@@ -105,10 +105,8 @@ def _search(config: Path, name: str, start_tai_s: float, end_tai_s: float) -> _S
     """One satellite's passes.  AcuDaemonError: its files or elements cannot be used."""
     target = load_target(config, name, start_tai_s, is_strict=False)
     propagator, site = target.elements.propagator, target.station.site
-    is_ephemeris = propagator.kind == "oem"
-    if not is_ephemeris and not any(
-        end >= start_tai_s and start <= end_tai_s for start, end in spans_tai_s(propagator)
-    ):
+    has_spans = is_ephemeris(propagator)
+    if not has_spans and not any(end >= start_tai_s and start <= end_tai_s for start, end in spans_tai_s(propagator)):
         propagator.states_teme(np.array([start_tai_s]))  # says why it has none
         raise OrbitError(f"{target.elements.label}: the search lies outside what is known of it")
     said = [f"warning: {text}" for text in [*target.elements.errors, *target.elements.warnings]]
@@ -125,7 +123,7 @@ def _search(config: Path, name: str, start_tai_s: float, end_tai_s: float) -> _S
         used = ", ".join(f"{len(of_set)} of {utc_text(one.elements.epoch_tai_s, 0)}" for one, of_set in by_epoch)
         said.append(f"note: {name}: each pass is computed from the set nearest to it: {used}")
     said += [f"warning: {name}: {text}" for text in gaps(target, start_tai_s, end_tai_s) + cut_passes(target, found)]
-    is_told = bool(found) or bool(until) or is_ephemeris
+    is_told = bool(found) or bool(until) or has_spans
     limits = target.station.acu.azimuth.limits(), target.station.acu.elevation.limits()
     beyond = {
         one: beyond_limits(of.elements.propagator, site, one, *limits) for of, of_set in by_epoch for one in of_set

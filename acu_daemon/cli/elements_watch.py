@@ -15,7 +15,7 @@ from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.elements_file import load_elements
 from acu_daemon.errors import AcuDaemonError, ElementsError
 from acu_daemon.model import Pass
-from acu_daemon.orbit.propagator import spans_tai_s
+from acu_daemon.orbit.propagator import is_ephemeris, spans_tai_s
 from acu_daemon.orbit.timescales import utc_text
 
 Stamp = tuple[tuple[str, int, int, int], ...]  # of each file: its name, time of change, size, number
@@ -123,15 +123,15 @@ def read_again(config: Path, name: str, old: Target, coming: Pass, now_tai_s: fl
 def why_worse(old: Target, new: Target, coming: Pass) -> str:
     """Why new elements are not taken; empty: they are at least as good for the coming pass."""
     mine, theirs = old.elements, new.elements
-    if theirs.propagator.kind == "oem":
+    if is_ephemeris(theirs.propagator):
         spans = spans_tai_s(theirs.propagator)
         if not any(start <= coming.rise_tai_s and coming.set_tai_s <= end for start, end in spans):
             return "the new ephemeris does not cover the coming pass"
         return ""
-    if mine.propagator.kind != "oem" and theirs.epoch_tai_s < mine.epoch_tai_s:
+    if not is_ephemeris(mine.propagator) and theirs.epoch_tai_s < mine.epoch_tai_s:
         return f"the new ones are older: epoch {utc_text(theirs.epoch_tai_s, 0)}"
     far_s, near_s = (abs(one.epoch_tai_s - coming.rise_tai_s) for one in (theirs, mine))
-    if mine.propagator.kind != "oem" and far_s > near_s:
+    if not is_ephemeris(mine.propagator) and far_s > near_s:
         return f"the epoch of the new ones, {utc_text(theirs.epoch_tai_s, 0)}, is further from the coming pass"
     given, before = new.satellite.uncertainty, old.satellite.uncertainty
     for key in ("position_km", "velocity_m_s"):

@@ -21,7 +21,7 @@ from acu_daemon.edge.state_directory import StateOwner, refuse_world_writable
 from acu_daemon.errors import ElementsError, UsageError
 from acu_daemon.model import EarthOrientation, Pass
 from acu_daemon.orbit.passes import find_passes
-from acu_daemon.orbit.propagator import spans_tai_s
+from acu_daemon.orbit.propagator import is_ephemeris, spans_tai_s
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 from acu_daemon.pointing.keyhole import longest_window_s
@@ -177,7 +177,7 @@ def beginning(target: Target, start_tai_s: float) -> str:
     """Say that nothing is known of an element set's satellite at the start of a search; empty where something is."""
     propagator = target.elements.propagator
     first_tai_s = spans_tai_s(propagator)[0][0]
-    if propagator.kind == "oem" or first_tai_s <= start_tai_s:
+    if is_ephemeris(propagator) or first_tai_s <= start_tai_s:
         return ""
     return (
         f"before {utc_text(first_tai_s, 0)} nothing is known: so far back from their epoch the elements give no orbit"
@@ -207,7 +207,9 @@ def lacking(target: Target, what: str, from_tai_s: float, to_tai_s: float) -> st
     A satellite about to decay is followed as long as anything is known of it.
     """
     spans = spans_tai_s(target.elements.propagator)
-    if target.elements.propagator.kind != "oem" or any(start <= from_tai_s and to_tai_s <= end for start, end in spans):
+    if not is_ephemeris(target.elements.propagator) or any(
+        start <= from_tai_s and to_tai_s <= end for start, end in spans
+    ):
         return ""
     covered = " and ".join(f"{utc_text(start, 0)} to {utc_text(end, 0)}" for start, end in spans)
     return (
@@ -219,7 +221,7 @@ def lacking(target: Target, what: str, from_tai_s: float, to_tai_s: float) -> st
 def cut_passes(target: Target, passes: list[Pass]) -> list[str]:
     """Say which passes begin or end only because an ephemeris does, or because the satellite decays."""
     spans = spans_tai_s(target.elements.propagator)
-    what = "the ephemeris" if target.elements.propagator.kind == "oem" else "what the elements know"
+    what = "the ephemeris" if is_ephemeris(target.elements.propagator) else "what the elements know"
     starts, ends = {start for start, _ in spans}, {end for _, end in spans}
     said = []
     for one in passes:

@@ -82,17 +82,24 @@ class LimitsSection(Section):
 
 
 class ElementsFileSection(Section):
-    kind: Literal["tle", "omm", "oem"] = Field(
+    kind: Literal["tle", "omm", "oem", "cpf", "sp3"] = Field(
         description=(
-            "What the file holds: two-line elements, an orbit mean-elements message, an ephemeris.  Decides how the "
-            "satellite moves: SGP4, or interpolation."
+            "What the file holds: two-line elements, an orbit mean-elements message, an ephemeris (CCSDS OEM, CPF of "
+            "the ILRS, SP3).  Decides how the satellite moves: SGP4, or interpolation."
         ),
     )
     file: str = Field(
         json_schema_extra={"range": "a path"},
         description=(
             "The file, relative to this TOML (docs/elements.md says what is read).  Decides the elements; it may hold "
-            "those of many satellites, and many of one."
+            "those of many satellites, and many of one.  It may be packed by gzip."
+        ),
+    )
+    object: Name | None = Field(
+        default=None,
+        description=(
+            "What an ephemeris of several satellites calls this one, such as L56 in an SP3 file; left out: its name.  "
+            "Decides which of them is used."
         ),
     )
     limits: LimitsSection = Field(

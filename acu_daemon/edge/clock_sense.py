@@ -2,7 +2,7 @@
 
 from acu_daemon import RELEASED_UTC
 from acu_daemon.edge.elements_file import LoadedElements
-from acu_daemon.orbit.propagator import spans_tai_s
+from acu_daemon.orbit.propagator import is_ephemeris, spans_tai_s
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 from acu_daemon.units import DAY_S
 
@@ -22,7 +22,7 @@ def before_release(now_tai_s: float) -> str:
 def before_elements(elements: LoadedElements, now_tai_s: float, is_synchronised: bool | None) -> str:
     """Say that nothing has synchronised the clock and that all elements are ahead of it; empty: not both."""
     propagator = elements.propagator
-    first_tai_s = spans_tai_s(propagator)[0][0] if propagator.kind == "oem" else elements.epoch_tai_s
+    first_tai_s = spans_tai_s(propagator)[0][0] if is_ephemeris(propagator) else elements.epoch_tai_s
     if is_synchronised is not False or first_tai_s - now_tai_s <= AHEAD_S:
         return ""
     return (

@@ -1,32 +1,26 @@
 """From a satellite's TOML to a propagator: reads the file of elements it names, chooses the set, checks it."""
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from acu_daemon.config.satellite_tables import BrouwerSection, ElementsFileSection, SatelliteFile
-from acu_daemon.edge.state_directory import refuse_world_writable
+from acu_daemon.edge.orbit_file import EPHEMERIS_PARSERS, SET_PARSERS, EphemerisParser, SetParser, read_orbit_file
 from acu_daemon.errors import ElementsError
 from acu_daemon.model import EarthOrientation
 from acu_daemon.orbit.brouwer import BrouwerElements, BrouwerPropagator
-from acu_daemon.orbit.contents import binary_kind, decoded, kind_of, what_else
-from acu_daemon.orbit.element_set import ElementSet, Problem
+from acu_daemon.orbit.element_set import Problem
 from acu_daemon.orbit.elements import check_brouwer, check_elements, check_ephemeris
-from acu_daemon.orbit.ephemeris import Ephemeris, OemPropagator
-from acu_daemon.orbit.oem import parse_oem
-from acu_daemon.orbit.omm import parse_omm
+from acu_daemon.orbit.ephemeris import Ephemeris, EphemerisPropagator
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.orbit.selection import is_of, select_elements, select_segments
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator
-from acu_daemon.orbit.tle import parse_tle
 from acu_daemon.units import DEG
 
 NAMED_PROBLEMS = 5
 RECENT_S = 2.0  # a file that changed within this time may still be in the writing: so long it is read again
 AGAIN_S = 0.2
 _NO_ORIENTATION = EarthOrientation()
-_PARSERS: dict[str, Callable[[str, str], tuple[list[ElementSet], list[Problem]]]] = {"tle": parse_tle, "omm": parse_omm}
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,14 +82,15 @@ def _load(
     section = satellite.elements
     if isinstance(section, BrouwerSection):
         return _from_brouwer(satellite, section, toml_path, now_tai_s)
-    path, text = _read(section, toml_path)
-    kind = kind_of(text)
-    if kind is None:
-        raise ElementsError(f"{path}: {what_else(text)}")
+    path = toml_path.parent / section.file
+    try:
+        kind, text = read_orbit_file(path)
+    except OSError as error:
+        raise ElementsError(f"{toml_path}: elements.file = {section.file!r}: {path}: {error.strerror}") from None
     loaded = (
-        _from_ephemeris(satellite, section, path, text, now_tai_s, orientation)
-        if kind == "oem"
-        else _from_sets(satellite, section, path, text, now_tai_s, at_tai_s, _PARSERS[kind])
+        _from_ephemeris(satellite, section, path, text, now_tai_s, orientation, EPHEMERIS_PARSERS[kind])
+        if kind in EPHEMERIS_PARSERS
+        else _from_sets(satellite, section, path, text, now_tai_s, at_tai_s, SET_PARSERS[kind])
     )
     if kind == section.kind:
         return loaded
@@ -128,7 +123,7 @@ def _from_sets(
     text: str,
     now_tai_s: float,
     at_tai_s: float,
-    parse: Callable[[str, str], tuple[list[ElementSet], list[Problem]]],
+    parse: SetParser,
 ) -> LoadedElements:
     sets, problems = parse(text, str(path))
     wanted = satellite.satellite
@@ -166,16 +161,19 @@ def _from_ephemeris(
     text: str,
     now_tai_s: float,
     orientation: EarthOrientation,
+    parse: EphemerisParser,
 ) -> LoadedElements:
-    segments, problems = parse_oem(text, str(path))
+    segments, problems = parse(text, str(path))
     if not segments:
         raise ElementsError("\n".join(_few(problems, "segments")))
     wanted = satellite.satellite
     try:
-        segments, doubts = select_segments(segments, wanted.norad_id, wanted.name, is_whole=not problems)
+        segments, doubts = select_segments(
+            segments, wanted.norad_id, section.object or wanted.name, is_whole=not problems
+        )
     except ElementsError as error:
         raise ElementsError("\n".join([str(error), *_few(problems, "segments")])) from None
-    propagator = OemPropagator(Ephemeris(segments, orientation))
+    propagator = EphemerisPropagator(Ephemeris(segments, orientation))
     errors, warnings = check_ephemeris(propagator, section.limits.limits(), now_tai_s)
     return LoadedElements(
         propagator,
@@ -184,19 +182,6 @@ def _from_ephemeris(
         errors,
         [*doubts, *warnings, *(note for one in segments for note in one.notes), *_few(problems, "segments")],
     )
-
-
-def _read(section: ElementsFileSection, toml_path: Path) -> tuple[Path, str]:
-    """The file's text.  ElementsError: it cannot be read, or is none."""
-    path = toml_path.parent / section.file
-    refuse_world_writable(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise ElementsError(f"{toml_path}: elements.file = {section.file!r}: {path}: {error.strerror}") from None
-    if what := binary_kind(data):
-        raise ElementsError(f"{path}: {what}; a file of elements is text")
-    return path, decoded(data)
 
 
 def _few(problems: list[Problem], what: str = "element sets") -> list[str]:

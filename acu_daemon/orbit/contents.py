@@ -4,11 +4,11 @@ import json
 import re
 from typing import Any, Literal
 
-FileKind = Literal["tle", "omm", "oem"]
+FileKind = Literal["tle", "omm", "oem", "cpf", "sp3"]
 
 _QUOTED = 160
 _SIGNATURES = (
-    *((b"\x1f\x8b", "a gzip archive: unpack it with gunzip"), (b"PK\x03\x04", "a zip archive: unpack it")),
+    *((b"\x1f\x9d", "a compress archive: unpack it with uncompress"), (b"PK\x03\x04", "a zip archive: unpack it")),
     *((b"BZh", "a bzip2 archive: unpack it with bunzip2"), (b"\xfd7zXZ", "an xz archive: unpack it with unxz")),
     *((b"\x28\xb5\x2f\xfd", "a zstd archive: unpack it with unzstd"), (b"7z\xbc\xaf", "a 7z archive: unpack it")),
     *((b"%PDF-", "a PDF document"), (b"\x89PNG", "a picture"), (b"\xff\xd8\xff", "a picture"), (b"GIF8", "a picture")),
@@ -16,6 +16,8 @@ _SIGNATURES = (
 )
 _UTF_16 = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
 _TLE = re.compile(r"^[ \t\xa0]*[12][ \t\xa0][ 0-9A-Za-z][ 0-9]{3}[0-9]", re.MULTILINE)
+_CPF = re.compile(r"\A(\s*00.*\n)*\s*H1\s+CPF\b", re.IGNORECASE)
+_SP3 = re.compile(r"\A\s*#[a-d][PV]\d{4} ", re.IGNORECASE)
 _OMM = re.compile(r"CCSDS_OMM_VERS|MEAN_MOTION|<omm\b|NORAD_CAT_ID", re.IGNORECASE)
 _OEM = re.compile(r"CCSDS_OEM_VERS|META_START|<oem\b|<stateVector", re.IGNORECASE)
 _PAGE = re.compile(r"<!doctype\s+html|<html\b|<head>|<title\b", re.IGNORECASE)  # <body> is also of CCSDS messages
@@ -39,6 +41,10 @@ def decoded(data: bytes) -> str:
 
 def kind_of(text: str) -> FileKind | None:
     """The format by the words that only it has; None where it has none of them."""
+    if _CPF.match(text):
+        return "cpf"
+    if _SP3.match(text):
+        return "sp3"
     if _TLE.search(text):
         return "tle"
     if _PAGE.search(text[:2000]):

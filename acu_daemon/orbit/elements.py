@@ -8,7 +8,7 @@ from acu_daemon.errors import OrbitError
 from acu_daemon.orbit.aging import expected_error
 from acu_daemon.orbit.brouwer import BrouwerElements
 from acu_daemon.orbit.element_set import ElementSet
-from acu_daemon.orbit.ephemeris import OemPropagator
+from acu_daemon.orbit.ephemeris import EphemerisPropagator
 from acu_daemon.orbit.kepler import osculating_from_state
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator
 from acu_daemon.orbit.timescales import utc_text
@@ -59,7 +59,9 @@ def check_brouwer(
     return [*_outside(label, elements.a_m, elements.e, elements.i_rad, limits), *too_old], warnings
 
 
-def check_ephemeris(propagator: OemPropagator, limits: ElementLimits, now_tai_s: float) -> tuple[list[str], list[str]]:
+def check_ephemeris(
+    propagator: EphemerisPropagator, limits: ElementLimits, now_tai_s: float
+) -> tuple[list[str], list[str]]:
     """Check that an ephemeris covers the present and that its orbit there lies within the limits.
 
     Its age does not count: it says itself how long it holds.  Returns: errors and warnings as texts.

@@ -8,10 +8,10 @@ import numpy.typing as npt
 
 from acu_daemon.errors import OrbitError
 from acu_daemon.model import Correction, EarthOrientation
+from acu_daemon.orbit.ephemeris_segment import EphemerisSegment
+from acu_daemon.orbit.ephemeris_states import check_neighbours, mean_motions_rad_s, states_teme
 from acu_daemon.orbit.hermite import HermiteTable
 from acu_daemon.orbit.kepler import OsculatingElements, osculating_from_state, state_from_elements
-from acu_daemon.orbit.oem import OemSegment
-from acu_daemon.orbit.oem_states import check_neighbours, mean_motions_rad_s, states_teme
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.units import MU_M3_S2, Array
 
@@ -30,12 +30,13 @@ class _Piece:
 class Ephemeris:
     """Interpolated states of one satellite, in the order of its segments.  Immutable, shared by all corrections."""
 
-    def __init__(self, segments: Sequence[OemSegment], orientation: EarthOrientation) -> None:
+    def __init__(self, segments: Sequence[EphemerisSegment], orientation: EarthOrientation) -> None:
         """Turn the segments of one satellite into TEME.
 
-        orientation: that of the station; with the same in both directions, it does not matter to an Earth-fixed OEM.
+        orientation: that of the station; with the same in both directions, it does not matter to an Earth-fixed one.
         Raises:  ElementsError: states that are no orbit around the Earth, or do not follow from each other.
         """
+        self.kind = segments[0].kind
         self.label = segments[0].label
         self.file = segments[0].file
         self._pieces: list[_Piece] = []
@@ -83,7 +84,7 @@ class Ephemeris:
         return r_m, v_m_s
 
 
-class OemPropagator:
+class EphemerisPropagator:
     """An ephemeris, corrected as a relative orbit.  Immutable and picklable.
 
     The correction of the mean anomaly (and that of the mean motion times the seconds since the epoch) becomes a shift
@@ -95,11 +96,10 @@ class OemPropagator:
     predicted, or the time of the spans next to it.
     """
 
-    kind = "oem"
-
     def __init__(self, ephemeris: Ephemeris, correction: Correction | None = None) -> None:
         self.ephemeris = ephemeris
         self.correction = correction or Correction()
+        self.kind: str = ephemeris.kind
         self.epoch_tai_s = ephemeris.epoch_tai_s
 
     @property
@@ -125,9 +125,9 @@ class OemPropagator:
         except ValueError as error:
             raise OrbitError(f"{self.ephemeris.label}: the corrected orbit is no ellipse: {error}") from None
 
-    def corrected(self, correction: Correction) -> "OemPropagator":
+    def corrected(self, correction: Correction) -> "EphemerisPropagator":
         """The same ephemeris with this correction in place of any earlier one."""
-        return OemPropagator(self.ephemeris, correction)
+        return EphemerisPropagator(self.ephemeris, correction)
 
 
 def _changed(elements: OsculatingElements, correction: Correction, beyond_s: Array) -> OsculatingElements:

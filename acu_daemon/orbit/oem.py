@@ -5,18 +5,15 @@ by its own method.  Only the Earth as centre, and frames and time systems that a
 """
 
 import re
-from dataclasses import dataclass, field
 from math import isfinite
-from typing import Literal
 
 import numpy as np
 
 from acu_daemon.orbit.element_set import Problem, place
+from acu_daemon.orbit.ephemeris_segment import EphemerisSegment, Frame
 from acu_daemon.orbit.oem_text import BadSegmentError, RawSegment, read_segments
 from acu_daemon.orbit.timescales import TIME_SYSTEMS, tai_from_ccsds
 from acu_daemon.units import Array
-
-Frame = Literal["TEME", "TOD", "EME2000", "GCRF", "ITRF"]
 
 _FRAMES: tuple[tuple[str, Frame], ...] = (
     (r"TEME(_?OF_?DATE)?", "TEME"),
@@ -32,46 +29,14 @@ _SAME = np.array([1.0, 1.0, 1.0, 1e-3, 1e-3, 1e-3])  # metres, m/s: by so much a
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 
 
-@dataclass(frozen=True, slots=True)
-class OemSegment:
-    """States of one satellite at rising times, as the file has them but for the units.
-
-    r_m, v_m_s: (N, 3) in `frame`; in ITRF the velocity is that seen by an observer who turns with the Earth.
-    """
-
-    version: str  # of the message; empty where it says none
-    name: str
-    object_id: str
-    frame: Frame
-    start_tai_s: float  # of the span that may be used
-    end_tai_s: float
-    created_tai_s: float | None  # the message's; states after it are predicted
-    tai_s: Array = field(repr=False)
-    r_m: Array = field(repr=False)
-    v_m_s: Array = field(repr=False)
-    file: str
-    line: int
-    notes: tuple[str, ...] = ()  # what was left out of it
-
-    @property
-    def label(self) -> str:
-        """Name and international designator, for messages."""
-        return f"{self.name} ({self.object_id})" if self.object_id else self.name
-
-    @property
-    def where(self) -> str:
-        """File and line, for messages."""
-        return place(self.file, self.line, None)
-
-
-def parse_oem(text: str, file: str) -> tuple[list[OemSegment], list[Problem]]:
+def parse_oem(text: str, file: str) -> tuple[list[EphemerisSegment], list[Problem]]:
     """Read every segment of a text, KVN or XML as its first character says.
 
     Args:    file: the name that messages give.
     Returns: the good segments in the order of the file, and for each other one a problem with its line.
     """
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
-    segments: list[OemSegment] = []
+    segments: list[EphemerisSegment] = []
     problems: list[Problem] = []
     try:
         found = read_segments(text)
@@ -87,7 +52,7 @@ def parse_oem(text: str, file: str) -> tuple[list[OemSegment], list[Problem]]:
     return segments, problems
 
 
-def _segment(raw: RawSegment, file: str) -> OemSegment:
+def _segment(raw: RawSegment, file: str) -> EphemerisSegment:
     if raw.problem is not None:
         raise raw.problem
     frame, system = _frame(raw), time_system(raw)
@@ -97,7 +62,8 @@ def _segment(raw: RawSegment, file: str) -> OemSegment:
     states = np.array([numbers(values, line) for line, _, values in raw.states]) * 1e3
     tai_s, states, notes = _without_repeats(raw, tai_s, states)
     start_tai_s, end_tai_s = useable_span_tai_s(raw, system, tai_s)
-    return OemSegment(
+    return EphemerisSegment(
+        kind="oem",
         version=raw.version,
         name=raw.fields.get("OBJECT_NAME", "").strip() or "(no OBJECT_NAME)",
         object_id=raw.fields.get("OBJECT_ID", ""),

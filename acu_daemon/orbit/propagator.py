@@ -6,6 +6,8 @@ from typing import Protocol, runtime_checkable
 from acu_daemon.model import Correction
 from acu_daemon.units import Array
 
+EPHEMERIDES = ("oem", "cpf", "sp3")
+
 
 class Propagator(Protocol):
     """A satellite's motion.  Immutable and picklable (it is sent to the process that fits)."""
@@ -42,6 +44,11 @@ class Bounded(Protocol):
     @property
     def spans_tai_s(self) -> tuple[tuple[float, float], ...]:
         """Start and end of every span, in order, ends included, without overlap."""
+
+
+def is_ephemeris(propagator: Propagator) -> bool:
+    """Whether a source says itself for when it holds, and has states in place of elements."""
+    return propagator.kind in EPHEMERIDES
 
 
 def spans_tai_s(propagator: Propagator) -> tuple[tuple[float, float], ...]:

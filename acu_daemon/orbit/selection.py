@@ -7,7 +7,7 @@ from difflib import get_close_matches
 
 from acu_daemon.errors import ElementsError
 from acu_daemon.orbit.element_set import ElementSet, Problem
-from acu_daemon.orbit.oem import OemSegment
+from acu_daemon.orbit.ephemeris_segment import EphemerisSegment
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.units import DAY_S
 
@@ -93,8 +93,8 @@ def is_of(problem: Problem, norad_id: int | None, name: str) -> bool:
 
 
 def select_segments(
-    segments: Sequence[OemSegment], norad_id: int | None, name: str, *, is_whole: bool = True
-) -> tuple[list[OemSegment], list[str]]:
+    segments: Sequence[EphemerisSegment], norad_id: int | None, name: str, *, is_whole: bool = True
+) -> tuple[list[EphemerisSegment], list[str]]:
     """Choose a satellite's segments of an ephemeris.
 
     A file with one satellite is taken as it is, with a warning where nothing in it says that it is this one; else, or
@@ -121,11 +121,11 @@ def select_segments(
     return found, [*_doubt_of(found[0], norad_id, name), *_version_of(found[0])]
 
 
-def _is_named(segment: OemSegment, name: str) -> bool:
+def _is_named(segment: EphemerisSegment, name: str) -> bool:
     return _plain(name) in (_plain(segment.name), _plain(segment.object_id))
 
 
-def _doubt_of(segment: OemSegment, norad_id: int | None, name: str) -> list[str]:
+def _doubt_of(segment: EphemerisSegment, norad_id: int | None, name: str) -> list[str]:
     if _are_alike(name, segment.name) or _is_named(segment, name) or _is_number(segment, norad_id):
         return []
     return [_stranger(segment.file, segment.label, name)]
@@ -141,18 +141,18 @@ def _stranger(file: str, label: str, name: str) -> str:
     return f"{file}: the file is of {label}, the satellite is named {name!r}: is it the right file?"
 
 
-def _version_of(segment: OemSegment) -> list[str]:
-    if segment.version in _VERSIONS:
+def _version_of(segment: EphemerisSegment) -> list[str]:
+    if segment.kind != "oem" or segment.version in _VERSIONS:
         return []
     given = f"CCSDS_OEM_VERS is {segment.version[:40]!r}" if segment.version else "CCSDS_OEM_VERS is missing"
     return [f"{segment.file}: {given}; versions {', '.join(_VERSIONS)} are known, the file is read as those are"]
 
 
-def _labels(segments: Sequence[OemSegment]) -> list[str]:
+def _labels(segments: Sequence[EphemerisSegment]) -> list[str]:
     return list(dict.fromkeys(one.label for one in segments))
 
 
-def _is_number(segment: OemSegment, norad_id: int | None) -> bool:
+def _is_number(segment: EphemerisSegment, norad_id: int | None) -> bool:
     text = segment.object_id
     return norad_id is not None and text.isascii() and text.isdigit() and int(text) == norad_id
 

@@ -5,8 +5,8 @@ import numpy as np
 from acu_daemon.errors import ElementsError
 from acu_daemon.model import EarthOrientation
 from acu_daemon.orbit.celestial import teme_from_eme2000, teme_from_gcrf, teme_from_tod
+from acu_daemon.orbit.ephemeris_segment import EphemerisSegment
 from acu_daemon.orbit.frames import teme_from_itrs_states
-from acu_daemon.orbit.oem import OemSegment
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.units import EARTH_EQUATORIAL_RADIUS_M, MU_M3_S2, Array
 
@@ -14,7 +14,7 @@ _ROTATIONS = {"EME2000": teme_from_eme2000, "GCRF": teme_from_gcrf, "TOD": teme_
 _FARTHEST_RAD = 1.0  # about 10 minutes on a low orbit
 
 
-def states_teme(segment: OemSegment, orientation: EarthOrientation) -> tuple[Array, Array]:
+def states_teme(segment: EphemerisSegment, orientation: EarthOrientation) -> tuple[Array, Array]:
     """Positions and velocities (N, 3), TEME; orientation: for Earth-fixed segments."""
     if segment.frame == "TEME":
         return segment.r_m, segment.v_m_s
@@ -24,7 +24,7 @@ def states_teme(segment: OemSegment, orientation: EarthOrientation) -> tuple[Arr
     return (rotation @ segment.r_m[..., None])[..., 0], (rotation @ segment.v_m_s[..., None])[..., 0]
 
 
-def mean_motions_rad_s(segment: OemSegment, r_m: Array, v_m_s: Array) -> Array:
+def mean_motions_rad_s(segment: EphemerisSegment, r_m: Array, v_m_s: Array) -> Array:
     """Osculating mean motions (N,) of the segment's states, turned into TEME.
 
     Raises:  ElementsError: a state that is not on an orbit around the Earth.
@@ -42,7 +42,7 @@ def mean_motions_rad_s(segment: OemSegment, r_m: Array, v_m_s: Array) -> Array:
     return mean_motions
 
 
-def check_neighbours(segment: OemSegment, r_m: Array, v_m_s: Array) -> None:
+def check_neighbours(segment: EphemerisSegment, r_m: Array, v_m_s: Array) -> None:
     """Compare each step with what its velocities and the Earth's pull make of it, by trapezoids.
 
     Positions, with the end correction: every step, loosely enough for a manoeuvre.  Velocities: the median, since a
@@ -77,5 +77,5 @@ def check_neighbours(segment: OemSegment, r_m: Array, v_m_s: Array) -> None:
         )
 
 
-def _at(segment: OemSegment, index: int) -> str:
+def _at(segment: EphemerisSegment, index: int) -> str:
     return f"{segment.where}: {segment.label}: from {utc_text(float(segment.tai_s[index]))} on"
