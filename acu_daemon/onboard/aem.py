@@ -14,9 +14,9 @@ import numpy as np
 
 from acu_daemon.onboard.gimbal_frames import turn
 from acu_daemon.orbit.element_set import Problem, place
+from acu_daemon.orbit.ephemeris_segment import Frame
 from acu_daemon.orbit.oem import (
     SUPPORTED_FRAMES,
-    Frame,
     epoch_tai_s,
     frame_named,
     numbers,
