@@ -23,6 +23,7 @@ from acu_daemon.config.onboard_tables import (
     TargetRow,
 )
 from acu_daemon.config.satellite_tables import BrouwerSection, ElementsFileSection, LimitsSection
+from acu_daemon.config.schedule_tables import MaintenanceSection
 from acu_daemon.config.section import Section
 from acu_daemon.config.station_tables import SafetySection, StationFile, TimeSection
 from acu_daemon.config.tracking_tables import TrackingSection
@@ -83,6 +84,8 @@ OUT_OF_SAID: dict[str, tuple[type[Section], dict[str, Any]]] = {  # ranges that 
     "AcuSection.url": (AcuSection, ACU | {"url": "http://localhost"}),
     "AcuSection.address": (AcuSection, ACU | {"address": "p"}),
     "TimeSection.earth_orientation": (TimeSection, {"earth_orientation": ""}),
+    "MaintenanceSection.from_utc": (MaintenanceSection, {"from_utc": "noon", "to_utc": "2026-01-01T00:00:00Z"}),
+    "MaintenanceSection.to_utc": (MaintenanceSection, {"from_utc": "2026-01-01T00:00:00Z", "to_utc": "2026-01-01"}),
     "TrackingSection.low_water_s": (TrackingSection, {"low_water_s": 90.0, "horizon_s": 90.0}),
     "SafetySection.register_watchdog_s": (SafetySection, {"register_watchdog_s": 1.9}),
     "SafetySection.following_error_s": (SafetySection, {"following_error_s": 0.4}),

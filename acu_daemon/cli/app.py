@@ -35,6 +35,8 @@ COMMANDS = {  # name: module of acu_daemon.cli, and the function in it
     "fault-proxy": ("fault_proxy", "command"),
     "demo": ("demo", "command"),
     "passes": ("coming_passes", "command"),
+    "schedule": ("schedule_command", "command"),
+    "pause": ("schedule_command", "pause"),
     "check": ("check", "command"),
     "latency-test": ("latency_test", "command"),
     "replay": ("replay_recording", "command"),

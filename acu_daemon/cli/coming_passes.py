@@ -117,7 +117,7 @@ def _search(config: Path, name: str, start_tai_s: float, end_tai_s: float) -> _S
     if until := ending(target, end_tai_s):
         said.append(f"warning: {name}: {until}, no pass is looked for after that")
     lowest_deg = target.station.station.min_elevation_deg
-    by_epoch = _passes_by_epoch(config, name, target, start_tai_s, end_tai_s)
+    by_epoch = passes_by_epoch(config, name, target, start_tai_s, end_tai_s)
     found = [one for _, of_set in by_epoch for one in of_set]
     if len(by_epoch) > 1:
         used = ", ".join(f"{len(of_set)} of {utc_text(one.elements.epoch_tai_s, 0)}" for one, of_set in by_epoch)
@@ -138,7 +138,7 @@ def _search(config: Path, name: str, start_tai_s: float, end_tai_s: float) -> _S
     )
 
 
-def _passes_by_epoch(
+def passes_by_epoch(
     config: Path, name: str, target: Target, start_tai_s: float, end_tai_s: float
 ) -> list[tuple[Target, list[Pass]]]:
     """The passes, each from the set of the file that is nearest to its rise; by set, in order."""

@@ -4,6 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from acu_daemon.config.schedule_tables import SatelliteScheduleSection
 from acu_daemon.config.section import Name, Positive, Section, UtcTime
 from acu_daemon.orbit.elements import ElementLimits
 
@@ -196,6 +197,10 @@ class SatelliteFile(Section):
     )
     fallback: FallbackSection = Field(
         default=FallbackSection(), description="What follows on a signal that does not come, or is lost."
+    )
+    schedule: SatelliteScheduleSection = Field(
+        default=SatelliteScheduleSection(),
+        description="What its passes are worth to a station with several satellites.",
     )
     receiver: dict[str, Any] = Field(
         default={}, description="Any keys of the station's [receiver], for this satellite alone."

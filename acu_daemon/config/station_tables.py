@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 from acu_daemon.config.acu_tables import AcuSection
 from acu_daemon.config.antenna_tables import AtmosphereSection, MountSection, antenna_of
 from acu_daemon.config.envelope_tables import EnvelopeSection
+from acu_daemon.config.schedule_tables import ScheduleSection
 from acu_daemon.config.section import Name, Section
 from acu_daemon.config.tracking_tables import ReadingsSection, ReceiverSection, TrackingSection
 from acu_daemon.model import EarthOrientation, Site, Station
@@ -175,6 +176,10 @@ class StationFile(Section):
             "What a survey of the mount gave: encoder = apparent direction + terms (docs/antenna-model.md has their "
             "signs)."
         ),
+    )
+
+    schedule: ScheduleSection = Field(
+        default=ScheduleSection(), description="Which passes a station tracks by itself, and what it does between them."
     )
 
     @model_validator(mode="after")

@@ -44,16 +44,22 @@ def choose_turn(path_az_deg: Array, path_el_deg: Array, limits: AxisLimits, pres
     same instants.  Near the zenith a turn that holds both ways round is preferred.  If none holds the path: the one
     that holds it longest from its start, then the one that holds most of it, and the result says so.
     """
+    best = equal_turns(path_az_deg, path_el_deg, limits)
+    return min(best, key=lambda turn: abs(float(path_az_deg[0]) + turn.offset_deg - present_az_deg))
+
+
+def equal_turns(path_az_deg: Array, path_el_deg: Array, limits: AxisLimits) -> tuple[Turn, ...]:
+    """The turns between which only the way to them decides, lowest first; arguments as those of choose_turn."""
     other_az_deg = _other_way(path_az_deg, path_el_deg)
     first = floor((limits.min_deg - float(path_az_deg.max())) / 360.0)
     last = ceil((limits.max_deg - float(path_az_deg.min())) / 360.0)
     turns = [_judge(360.0 * k, path_az_deg, other_az_deg, limits) for k in range(first, last + 1)]
+    best = max(map(_merit, turns))
+    return tuple(turn for turn in turns if _merit(turn) == best)
 
-    def merit(turn: Turn) -> tuple[float, ...]:
-        away_deg = abs(float(path_az_deg[0]) + turn.offset_deg - present_az_deg)
-        return (turn.holds_either_way, turn.holds_path, turn.held_fraction, turn.inside_fraction, -away_deg)
 
-    return max(turns, key=merit)
+def _merit(turn: Turn) -> tuple[float, ...]:
+    return (turn.holds_either_way, turn.holds_path, turn.held_fraction, turn.inside_fraction)
 
 
 def _other_way(az_deg: Array, el_deg: Array) -> Array:
