@@ -244,11 +244,30 @@ class Pointing:
 
 
 @dataclass(frozen=True, slots=True)
+class ZenithCrossing:
+    """How an antenna whose azimuth drive is too slow crosses the zenith (pointing.keyhole).
+
+    It leaves the path at the departure, at that continuous azimuth and rate, and is back on both at the return.
+    peak_rate_deg_s: what the path asks for.  lost_s: seconds out of half the beam, from lost_from_tai_s on.
+    """
+
+    departure_tai_s: float
+    return_tai_s: float
+    departure_az_deg: float
+    departure_rate_deg_s: float
+    peak_rate_deg_s: float
+    largest_error_deg: float
+    lost_s: float
+    lost_from_tai_s: float | None
+
+
+@dataclass(frozen=True, slots=True)
 class Prediction:
     """The prediction buffer: pointing at even steps, azimuth continuous through north (may leave [0, 360)).
 
-    The arrays are (N,).  `follow_az_deg` is the path for an antenna that follows the registers: the same as `az_deg`
-    but where the azimuth drive is too slow (near the zenith), there a path it can follow (pointing.keyhole).
+    The arrays are (N,).  `follow_az_deg` and `follow_el_deg` are the path for an antenna that follows the registers:
+    the path itself, for the elevation None, but where the azimuth drive is too slow (near the zenith), there one that
+    it can follow (pointing.keyhole); `crossing` says how.
     """
 
     start_tai_s: float
@@ -265,6 +284,9 @@ class Prediction:
     model: Model = Model.ELEMENTS  # the kind, more closely
     spread: tuple[float, float] | None = None  # 1 sigma at made_at: along the track, s, and across it, deg
     late_drift_deg_s: Array | None = None  # (2, N): right and up, what a second of lateness moves beside `at`
+    follow_el_deg: Array | None = None
+    follow_el_rate_deg_s: Array | None = None
+    crossing: ZenithCrossing | None = None
 
     @property
     def is_finite(self) -> bool:
@@ -274,7 +296,8 @@ class Prediction:
             *(self.follow_az_deg, self.follow_az_rate_deg_s),
         )
         is_sigma = self.sigma_deg is None or not bool(np.isnan(self.sigma_deg).any())
-        more = [one for one in (self.late_drift_deg_s, self.spread) if one is not None]
+        optional = (self.late_drift_deg_s, self.spread, self.follow_el_deg, self.follow_el_rate_deg_s)
+        more = [one for one in optional if one is not None]
         return is_sigma and all(bool(np.isfinite(one).all()) for one in (*arrays, *more))
 
     @property
@@ -298,7 +321,10 @@ class Prediction:
         az = self.follow_az_deg if follow else self.az_deg
         az_rate = self.follow_az_rate_deg_s if follow else self.az_rate_deg_s
         az_deg, az_rate_deg_s = _hermite(az, az_rate, i, x - i, self.step_s)
-        el_deg, el_rate_deg_s = _hermite(self.el_deg, self.el_rate_deg_s, i, x - i, self.step_s)
+        el, el_rate = self.el_deg, self.el_rate_deg_s
+        if follow and self.follow_el_deg is not None and self.follow_el_rate_deg_s is not None:
+            el, el_rate = self.follow_el_deg, self.follow_el_rate_deg_s
+        el_deg, el_rate_deg_s = _hermite(el, el_rate, i, x - i, self.step_s)
         return Pointing(az_deg, el_deg, az_rate_deg_s, el_rate_deg_s)
 
 

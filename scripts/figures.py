@@ -61,7 +61,7 @@ from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator
 from acu_daemon.orbit.timescales import gmst_rad, tai_from_utc
 from acu_daemon.orbit.tle import parse_tle
-from acu_daemon.pointing.keyhole import follow_path
+from acu_daemon.pointing.keyhole import KeyholeRules, SkyPath, follow_path
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.scenario import AcuChoice, Encoder, Loss, Scenario
@@ -141,11 +141,13 @@ def keyhole_window(sky: DirectionTable, loss: tuple[float, float]) -> tuple[tupl
     seen = [sky.direction(float(t)) or (math.nan, math.nan, math.nan) for t in tai_s]
     az_deg = np.degrees(np.unwrap(np.radians([one[0] for one in seen])))
     el_deg = np.array([one[1] for one in seen])
-    best, _ = follow_path(az_deg, np.gradient(az_deg, 0.1), 0.1, AZIMUTH)
-    off = np.flatnonzero(np.abs(best - az_deg) > 1e-3)
+    path = SkyPath(az_deg, el_deg, np.gradient(az_deg, 0.1), np.gradient(el_deg, 0.1), 0.1)
+    best, _ = follow_path(path, KeyholeRules(AZIMUTH))
+    off = np.flatnonzero(np.abs(best.az_deg - az_deg) > 1e-3)
     if off.size == 0:
         return (math.inf, math.inf), 0.0
-    error = [sky_angle_deg(best[i], el_deg[i], az_deg[i], el_deg[i]) for i in off if loss[0] < tai_s[i] < loss[1]]
+    within = [i for i in off if loss[0] < tai_s[i] < loss[1]]
+    error = [sky_angle_deg(best.az_deg[i], best.el_deg[i], az_deg[i], el_deg[i]) for i in within]
     margin_s = 1.0  # the drive meets the path again: a second for its lag and for what the orbit's fit is wrong in time
     return (float(tai_s[off[0]]) - margin_s, float(tai_s[off[-1]]) + margin_s), 0.1 * sum(one > 0.5 for one in error)
 

@@ -1,7 +1,5 @@
 """assist.session.prediction: the buffer, continuous through north and zenith, smooth and exact between its samples."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 from made_orbits import EPOCH_TAI_S, circular, site
@@ -13,7 +11,7 @@ from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.control.tracking.track_frame import beside
 from acu_daemon.model import AxisLimits, Correction, Model, Readings, sky_angle_deg
 from acu_daemon.orbit.look import look_at
-from acu_daemon.pointing.keyhole import follow_path, longest_window_s
+from acu_daemon.pointing.keyhole import KeyholeRules, longest_window_s
 
 BETWEEN_SAMPLES_DEG = 0.001
 DRIVE = AxisLimits(-270.0, 270.0, 20.0, 10.0)
@@ -79,7 +77,7 @@ def test_the_buffer_has_a_pair_every_step_up_to_its_horizon():
 
 def test_a_buffer_that_starts_inside_the_keyhole_continues_what_the_one_before_planned():
     propagator = circular()
-    more = {"lead_in_s": longest_window_s(DRIVE), "follow": partial(follow_path, azimuth=DRIVE)}
+    more = {"lead_in_s": longest_window_s(DRIVE), "keyhole": KeyholeRules(DRIVE)}
     early = _predict(propagator, OVERHEAD, -45.0, 180.0, **more)
     assert np.abs(early.follow_az_deg - early.az_deg).max() > 45.0
     for later_s in (-4.0, -0.3, 0.2, 4.0):

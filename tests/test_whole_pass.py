@@ -27,10 +27,9 @@ from real_pass import truth_path, truth_span, write_config
 from acu_daemon.cli.options import Target, load_target
 from acu_daemon.cli.virtual_pass import Flight, fly
 from acu_daemon.drivers.sa3842.messages import Stop, WriteAndPoll, WriteParameter
-from acu_daemon.model import sky_angle_deg
 from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.timescales import tai_from_utc
-from acu_daemon.pointing.keyhole import follow_path
+from acu_daemon.pointing.keyhole import KeyholeRules, SkyPath, follow_path
 from acu_daemon.sim.scenario import AcuChoice, Encoder, Scenario, SkyErrors
 from acu_daemon.sim.sky import read_truth
 
@@ -167,8 +166,10 @@ def worst_of_the_plan_deg(target: Target, errors: SkyErrors) -> float:
     seen = [sky.direction(float(t)) for t in tai_s]
     az_deg = np.degrees(np.unwrap(np.radians([one[0] for one in seen if one])))
     el_deg = np.array([one[1] for one in seen if one])
-    plan_deg, _ = follow_path(az_deg, np.gradient(az_deg, 0.1), 0.1, target.station.acu.azimuth.limits())
-    return max(sky_angle_deg(a, e, b, e) for a, b, e in zip(plan_deg, az_deg, el_deg, strict=True))
+    path = SkyPath(az_deg, el_deg, np.gradient(az_deg, 0.1), np.gradient(el_deg, 0.1), 0.1)
+    _, crossing = follow_path(path, KeyholeRules(target.station.acu.azimuth.limits()))
+    assert crossing is not None
+    return crossing.largest_error_deg
 
 
 # The cable wrap

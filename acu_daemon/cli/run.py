@@ -261,6 +261,7 @@ def make_job(
             estimator_settings(station, target.satellite),
             station.acu.azimuth.limits(),
             carried=carried,
+            zenith_objective=station.tracking.zenith_objective,
         ),
         control=replace(control_config(station, target.satellite, link.byte_time_s), is_rehearsal=is_rehearsal),
         coming=coming,

@@ -107,6 +107,14 @@ class TrackingSection(Section):
             "it begins to move."
         ),
     )
+    zenith_objective: Literal["largest_error", "seconds"] = Field(
+        default="largest_error",
+        description=(
+            "What a pass near the zenith loses least of where the azimuth drive is too slow (docs/pass-plan.md): the "
+            "largest error of the beam, or seconds out of it, with errors up to 1.9 times larger, all on one side.  "
+            "Decides when the antenna leaves the path."
+        ),
+    )
     search_along_s: Positive = Field(
         default=10.0,
         description=(

@@ -21,7 +21,7 @@ from acu_daemon.daemon.area import CommonArea
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.fit import FitDiedError, FitFailedError, FitRunner
 from acu_daemon.errors import OrbitError
-from acu_daemon.model import FitResult, Model, Readings
+from acu_daemon.model import FitResult, Model, Readings, ZenithCrossing
 from acu_daemon.orbit.propagator import spans_tai_s
 from acu_daemon.pointing.keyhole import longest_window_s
 
@@ -30,6 +30,7 @@ PAST_S = 1.0  # the buffer starts this long before now: readings are compared at
 LEAST_HORIZON_S = 10.0  # of a buffer, also where the satellite is about to decay
 RETRY_S = 0.5
 REACH_SLACK_S = 1.0
+FROZEN_S = 5.0  # before its departure a crossing of the zenith is planned anew only for a sure gain
 BESIDE = frozenset({TrackState.ACQUIRE_TLE, TrackState.AUTOTRACK_TLE, TrackState.HOLD_TLE, TrackState.SEARCH})
 LONGEST_ANSWER_S = 5.0  # of the fit process
 ANSWER_SHARE = 0.5  # of the low water is for its answer, the rest is left when the daemon predicts without it
@@ -189,7 +190,15 @@ class Background:
             horizon_s=max(min(self._horizon_s + PAST_S + past_s + ahead_s, known_s), LEAST_HORIZON_S),
             now_tai_s=now_tai_s,
             near_az_deg=self._near_az_deg(now_tai_s),
+            in_hand=self._in_hand(now_tai_s),
         )
+
+    def _in_hand(self, now_tai_s: float) -> ZenithCrossing | None:
+        """The crossing of the zenith that is gone on with, though the fit moves its path."""
+        crossing = self._area.sky.prediction.crossing if self._area.sky.prediction else None
+        if crossing is None or not crossing.departure_tai_s - FROZEN_S <= now_tai_s <= crossing.return_tai_s:
+            return None
+        return crossing
 
     def _is_filled(self, now_tai_s: float, low_water_s: float) -> bool:
         """Whether the buffer holds so much ahead of now, and before it what a satellite that is late asks for."""

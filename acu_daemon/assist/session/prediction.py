@@ -1,22 +1,16 @@
 """The prediction buffer: where the satellite will be, at even steps ahead of now.  Pure."""
 
-from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from acu_daemon.assist.mount_model import encoder_look, sigma_deg
-from acu_daemon.model import FitResult, Prediction, PredictionKind, Site
+from acu_daemon.model import FitResult, Prediction, PredictionKind, Site, ZenithCrossing
 from acu_daemon.orbit.frames import enu_from_itrs, station_itrs_m
 from acu_daemon.orbit.look import Look, look_along
 from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.pointing.keyhole import Begun, KeyholeRules, SkyPath, follow_path
 from acu_daemon.units import DEG, EARTH_RATE_RAD_S, Array, wrap_180, wrap_180_array
-
-FollowPath = Callable[[Array, Array, float], tuple[Array, Array]]
-"""From continuous azimuth, its rate (N,) and the step in s to an azimuth path and rate that the drive can follow."""
-
-
-def _as_it_is(az_deg: Array, az_rate_deg_s: Array, _step_s: float) -> tuple[Array, Array]:
-    return az_deg, az_rate_deg_s
 
 
 def predict(
@@ -30,16 +24,17 @@ def predict(
     horizon_s: float = 90.0,
     step_s: float = 0.1,
     lead_in_s: float = 0.0,
-    follow: FollowPath = _as_it_is,
+    keyhole: KeyholeRules | None = None,
+    in_hand: ZenithCrossing | None = None,
     fit: FitResult | None = None,
 ) -> Prediction:
     """Predict pointing from start_tai_s over horizon_s.
 
     near_az_deg: continuous azimuth (encoder frame) near which the path is at made_at_tai_s, or at its start where that
-    is later; it picks the turn.  From there azimuth is continuous, through north and past the zenith.  follow: makes
-    the path for an antenna that follows the registers, such as `pointing.keyhole.follow_path` with the drive's limits;
-    it sees the path from lead_in_s before the start, so that a buffer that starts inside the keyhole continues what the
-    one before it planned.
+    is later; it picks the turn.  From there azimuth is continuous, through north and past the zenith.  keyhole: what
+    the antenna can do that follows the registers (None: all); its path is made from lead_in_s before the start on, so
+    that a buffer that starts inside the keyhole continues what the one before it planned.  in_hand: the crossing of the
+    zenith that the antenna is on, or is about to begin (pointing.keyhole).
     fit: what corrected the propagator; its biases and its place of the station are in the prediction, and its
     covariance gives sigma_deg.
     Raises:  OrbitError: the propagator has no answer for one of the times.
@@ -51,7 +46,12 @@ def predict(
     az_deg = _continuous(seen.az_deg, seen.az_rate_deg_s, step_s)
     near = min(max(before + round((made_at_tai_s - start_tai_s) / step_s), before), tai_s.size - 1)
     az_deg += near_az_deg + wrap_180(float(seen.az_deg[near]) - near_az_deg) - az_deg[near]
-    follow_az_deg, follow_az_rate_deg_s = follow(az_deg, seen.az_rate_deg_s, step_s)
+    path = SkyPath(az_deg, seen.el_deg, seen.az_rate_deg_s, seen.el_rate_deg_s, step_s)
+    followed, crossing = path, None
+    if keyhole is not None:
+        first_tai_s = float(tai_s[0])
+        followed, crossing = follow_path(path, keyhole, _begun(in_hand, path, first_tai_s, made_at_tai_s))
+        crossing = crossing and _from_tai_s(crossing, first_tai_s)
     return Prediction(
         start_tai_s=start_tai_s,
         step_s=step_s,
@@ -59,12 +59,38 @@ def predict(
         el_deg=seen.el_deg[before:],
         az_rate_deg_s=seen.az_rate_deg_s[before:],
         el_rate_deg_s=seen.el_rate_deg_s[before:],
-        follow_az_deg=follow_az_deg[before:],
-        follow_az_rate_deg_s=follow_az_rate_deg_s[before:],
+        follow_az_deg=followed.az_deg[before:],
+        follow_az_rate_deg_s=followed.az_rate_deg_s[before:],
         kind=kind,
         made_at_tai_s=made_at_tai_s,
         sigma_deg=sigma_deg(propagator, tai_s[before:], site, fit),
         late_drift_deg_s=_late_drift_deg_s(seen, site)[:, before:],
+        follow_el_deg=followed.el_deg[before:] if crossing else None,
+        follow_el_rate_deg_s=followed.el_rate_deg_s[before:] if crossing else None,
+        crossing=crossing,
+    )
+
+
+def _begun(in_hand: ZenithCrossing | None, path: SkyPath, first_tai_s: float, now_tai_s: float) -> Begun | None:
+    """The crossing in hand on the turn of the path, in seconds from its start; None where it begins elsewhere."""
+    if in_hand is None:
+        return None
+    departure_s = in_hand.departure_tai_s - first_tai_s
+    k = round(departure_s / path.step_s)
+    if not 0 <= k < path.az_deg.size:
+        return None
+    az_deg = float(path.az_deg[k]) + wrap_180(in_hand.departure_az_deg - float(path.az_deg[k]))
+    return Begun(departure_s, az_deg, in_hand.departure_rate_deg_s, now_tai_s - first_tai_s)
+
+
+def _from_tai_s(crossing: ZenithCrossing, first_tai_s: float) -> ZenithCrossing:
+    """Its times, which count from the path's start, as TAI."""
+    lost_from_s = crossing.lost_from_tai_s
+    return replace(
+        crossing,
+        departure_tai_s=crossing.departure_tai_s + first_tai_s,
+        return_tai_s=crossing.return_tai_s + first_tai_s,
+        lost_from_tai_s=None if lost_from_s is None else lost_from_s + first_tai_s,
     )
 
 

@@ -5,7 +5,6 @@ The same object runs in the child process, inline in virtual time, and in a repl
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 from acu_daemon.assist.estimators.estimator import Estimator, EstimatorSettings, has_covariance, make_estimator
 from acu_daemon.assist.estimators.full.carry_over import CarryOver, aged_prior, first_fit
@@ -15,9 +14,9 @@ from acu_daemon.assist.screening.track_gate import TrackGate
 from acu_daemon.assist.session.model_choice import ModelChoice, choose, is_good, newest_residual_deg
 from acu_daemon.assist.session.prediction import predict
 from acu_daemon.assist.session.prediction_spread import spread_of
-from acu_daemon.model import AxisLimits, FitResult, Model, Prediction, Readings, Site
+from acu_daemon.model import AxisLimits, FitResult, Model, Prediction, Readings, Site, ZenithCrossing
 from acu_daemon.orbit.propagator import Propagator
-from acu_daemon.pointing.keyhole import follow_path, longest_window_s
+from acu_daemon.pointing.keyhole import KeyholeRules, Objective, longest_window_s
 
 BATCH_S = 1.0  # readings are judged by the fit to those before them: so many at a time
 BATCH_SHARE = 0.1  # or this share of what was taken already, such as when a new child is given a whole pass
@@ -41,6 +40,14 @@ class RefitSetup:
     azimuth: AxisLimits
     step_s: float = 0.1
     carried: CarryOver | None = None
+    zenith_objective: Objective = "largest_error"
+
+    @property
+    def keyhole(self) -> KeyholeRules:
+        """What the antenna can do near the zenith."""
+        max_el_deg = 90.0 if self.settings.elevation is None else min(self.settings.elevation.max_deg, 90.0)
+        half_beam_deg = self.settings.beamwidth_deg / 2.0
+        return KeyholeRules(self.azimuth, max_el_deg, half_beam_deg, self.zenith_objective)
 
     @property
     def is_resumed(self) -> bool:
@@ -57,6 +64,7 @@ class RefitRequest:
     horizon_s: float
     now_tai_s: float
     near_az_deg: float  # picks the turn of the azimuth at the start of the buffer
+    in_hand: ZenithCrossing | None = None  # the crossing of the zenith that the antenna is on, or is about to begin
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,7 +236,8 @@ def predict_from(setup: RefitSetup, fit: FitResult | None, request: RefitRequest
         step_s=setup.step_s,
         near_az_deg=request.near_az_deg,
         lead_in_s=longest_window_s(setup.azimuth),
-        follow=partial(follow_path, azimuth=setup.azimuth),
+        keyhole=setup.keyhole,
+        in_hand=request.in_hand,
         fit=fit,
     )
     what = (setup.propagator, setup.site, setup.settings)
