@@ -202,6 +202,12 @@ OCCASIONS = {
         DISARMED | goes_to(TrackState.IDLE) | asks(WriteParameter("W", 0)) | {"arming.disarmed_by": OTHERS},
         seen=saw(IN_STANDBY),
     ),
+    "another hand, or the register watchdog, stops": Occasion(
+        "",
+        goes_to(TrackState.IDLE) | asks(ReadFaults()) | {"foreign_stop.is_doubted": True},
+        before={"in_force": (NOW - 5.0, AZ_DEG, EL_DEG), "commands": (None,)},
+        seen=saw(IN_STANDBY),
+    ),
     "the signal is back": Occasion(
         f"{NOT_FOLLOWED} search.scan",
         {"signal.acquired_since_tai_s": NOW - 0.09, **goes_to(TrackState.AUTOTRACK_FITTED)},
