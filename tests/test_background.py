@@ -23,6 +23,7 @@ from acu_daemon.daemon import background as module
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.background import BESIDE, PAST_S, Background
 from acu_daemon.model import AxisLimits, Correction, FitResult, Model, Prediction, Reading
+from acu_daemon.pointing.envelope import Envelope
 
 AZIMUTH, ELEVATION = AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0)
 WHERE, SOURCE = site(6.0, 3.0), circular()
@@ -30,7 +31,7 @@ SETUP = RefitSetup(SOURCE, WHERE, "full", EstimatorSettings(0.03, 0.03), AZIMUTH
 RISE = float(visible(SOURCE, WHERE, 1.0)[0])
 NOW = RISE + 100.0
 PLAN = PassPlan(RISE, RISE + 600.0, RISE, 50.0, 5.0)
-CONFIG_HERE = ControlConfig(AZIMUTH, ELEVATION)
+CONFIG_HERE = ControlConfig(Envelope(AZIMUTH, ELEVATION))
 HORIZON_S, LOW_S = 90.0, 30.0
 WINDOW_S = 13.474  # in which an azimuth with 95 % of 20 deg/s and 10 deg/s2 makes half a turn
 FIT = FitResult("full", Correction(), NOW, 100, 0, 0.01, 0.1, 0.01)
