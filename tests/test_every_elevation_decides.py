@@ -15,7 +15,7 @@ from acu_daemon.control.safety.axis_watch import AxesWatch, AxisSeen, Bounds, Du
 from acu_daemon.control.safety.encoder_watch import FROZEN_DEG, EncoderWatch, watch_encoders
 from acu_daemon.control.safety.status_plausibility import CONFIRMED_COUNT, CONFIRMED_DEG, RATE_MARGIN, SLACK_DEG
 from acu_daemon.control.state import Scan, StartStage
-from acu_daemon.control.tick_input import PassPlan, Sky
+from acu_daemon.control.tick_input import Observation, PassPlan, Sky, TickInput
 from acu_daemon.control.tracking.causes import HEARD_BEAMS, ON_POINT_BEAMS, RESUME_DEG, find_causes
 from acu_daemon.control.tracking.register_limiter import limit
 from acu_daemon.control.tracking.scan import DWELL_S, ON_PLACE_BEAMS, go_on, look, pace_s_s, row_deg
@@ -168,7 +168,7 @@ def causes(
     plan = PassPlan(NOW - from_rise_s, NOW + 500.0, NOW - 200.0, 100.0, path.at(NOW).el_deg)
     seen = replace(seen, az_deg=place[0] % 360.0, el_deg=place[1])
     state = remembering(track=track, entered_tai_s=NOW - 1.0, stage=StartStage.READY, status=seen, az_deg=place[0])
-    return find_causes(state, Sky(path, None, plan), 0.0, NOW, CONFIG)
+    return find_causes(state, TickInput(Observation(), Sky(path, None, plan), NOW), CONFIG)
 
 
 IN_REMOTE = Status(0.0, 0.0, AcuMode.REMOTE, backup_selected=Backup.REMOTE)

@@ -5,7 +5,7 @@ from dataclasses import replace
 from acu_daemon.control.orders import Event
 from acu_daemon.control.safety.encoder_watch import EncoderWatch, watch_encoders
 from acu_daemon.control.state import ControlState, Intake
-from acu_daemon.control.tick_input import Observation, Sky
+from acu_daemon.control.tick_input import Sky, TickInput
 from acu_daemon.control.tracking.causes import is_acquired
 from acu_daemon.control.tracking.state_table import AUTOTRACKING
 from acu_daemon.drivers.sa3842.messages import AcuMode, Status
@@ -15,25 +15,19 @@ RATE_READINGS = 6  # the rate of an axis is taken over this many readings: near 
 
 
 def take_status(
-    state: ControlState,
-    seen: Observation,
-    status: Status,
-    reading: Reading,
-    az_deg: float,
-    sky: Sky,
-    events: list[Event],
+    state: ControlState, status: Status, reading: Reading, az_deg: float, given: TickInput, events: list[Event]
 ) -> ControlState:
     """Remember a status and its reading, and watch the encoders.  az_deg: where the azimuth is, continuous."""
     before = state.intake
     intake = Intake(
         status=status,
         reading=reading,
-        is_place_sure=seen.is_confirmed,
+        is_place_sure=given.seen.is_confirmed,
         az_deg=az_deg,
         track_of_readings=(*before.track_of_readings[1 - RATE_READINGS :], (reading.tai_s, az_deg, status.el_deg)),
         is_stow_kept=_is_stow_kept(state, status),
     )
-    encoders = _watched(state, status, reading, sky, events) if seen.is_in_step else state.encoders
+    encoders = _watched(state, status, reading, given.sky, events) if given.seen.is_in_step else state.encoders
     return replace(state, intake=intake, encoders=encoders)
 
 

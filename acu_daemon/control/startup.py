@@ -103,13 +103,12 @@ def watchdog_code(config: ControlConfig) -> int:
 
 def _present(state: ControlState, config: ControlConfig) -> tuple[float, float]:
     """Where the ends of the range have one bearing, within a code of it that bearing: both ends are it, and reached."""
-    el_deg = state.intake.status.el_deg if state.intake.status else 0.0
     az_deg, ends_deg = state.intake.az_deg, (config.azimuth.min_deg, config.azimuth.max_deg)
     if abs(ends_deg[1] - ends_deg[0] - 360.0) < LSB_DEG:
         az_deg = next((end for end in ends_deg if abs(az_deg - end) <= 1.01 * LSB_DEG), az_deg)
     return (
         clamp_deg(az_deg, *ends_deg),
-        clamp_deg(el_deg, config.elevation.min_deg, config.elevation.max_deg),
+        clamp_deg(state.intake.el_deg, config.elevation.min_deg, config.elevation.max_deg),
     )
 
 

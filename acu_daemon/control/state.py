@@ -51,6 +51,11 @@ class Intake:
     track_of_readings: tuple[tuple[float, float, float], ...] = ()  # the newest: time, continuous azimuth, elevation
     is_stow_kept: bool = False  # somebody stowed the antenna while we looked on: it stays, also after a lost link
 
+    @property
+    def el_deg(self) -> float:
+        """Elevation of the newest status; 0 before the first."""
+        return self.status.el_deg if self.status is not None else 0.0
+
 
 @dataclass(frozen=True, slots=True)
 class Fitting:

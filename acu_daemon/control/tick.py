@@ -27,7 +27,7 @@ from acu_daemon.control.safety.supervision import supervise
 from acu_daemon.control.safety.turn_doubt import locate_azimuth
 from acu_daemon.control.startup import after_reply, watch_for_power_cycle
 from acu_daemon.control.state import ControlState, StartStage
-from acu_daemon.control.tick_input import Observation, Sky, TickInput
+from acu_daemon.control.tick_input import TickInput
 from acu_daemon.control.tracking.aim import aim
 from acu_daemon.control.tracking.learned_lag import learn_lag
 from acu_daemon.control.tracking.path_offset import drop_unusable_offset, forget_other_pass, learn_of_signal
@@ -43,26 +43,25 @@ def tick(state: ControlState, given: TickInput, config: ControlConfig) -> tuple[
     What is not finite in what it is given is left out, counted, and told once; without a finite time it only polls.
     """
     events: list[Event] = []
-    now_tai_s = given.now_tai_s
-    seen, sky, refused = finite_only(given.seen, given.sky)
+    given, refused = finite_only(given)
     state, refused = drop_unusable_offset(state, refused)
-    state = refuse_input(state, refused if math.isfinite(now_tai_s) else "time", events)
-    if not math.isfinite(now_tai_s):
+    is_time = math.isfinite(given.now_tai_s)
+    state = refuse_input(state, refused if is_time else "time", events)
+    if not is_time:
         return state, Orders(Poll(), None, tuple(events))
     before = state
-    state = take_in(state, seen, sky, now_tai_s, config, events)
-    state = supervise(before, state, seen, config, events)
-    state = note_held(walk(forget_other_pass(state, sky), seen, sky, now_tai_s, config, events), config)
-    state = learn_of_signal(state, seen, sky, config, events)
-    state = search(before, state, seen, sky, now_tai_s, config, events)
-    state, orders = order(before, state, seen, sky, now_tai_s, config, events)
-    return permit(state, orders, now_tai_s, config)
+    state = take_in(state, given, config, events)
+    state = supervise(before, state, given.seen, config, events)
+    state = note_held(walk(forget_other_pass(state, given.sky), given, config, events), config)
+    state = learn_of_signal(state, given, config, events)
+    state = search(before, state, given, config, events)
+    state, orders = order(before, state, given, config, events)
+    return permit(state, orders, given.now_tai_s, config)
 
 
-def take_in(
-    state: ControlState, seen: Observation, sky: Sky, now_tai_s: float, config: ControlConfig, events: list[Event]
-) -> ControlState:
+def take_in(state: ControlState, given: TickInput, config: ControlConfig, events: list[Event]) -> ControlState:
     """Take in what the last tick brought; facts for the log are added to events."""
+    seen, now_tai_s = given.seen, given.now_tai_s
     status, reading, extra = seen.status, seen.reading, seen.extra
     if seen.refused is not None:
         state = take_refusal(state, now_tai_s, events)
@@ -70,7 +69,7 @@ def take_in(
         state, az_deg = locate_azimuth(take_in_force(state, seen), status, reading, config, events)
         state = learn_lag(state, az_deg, status.el_deg) if seen.is_in_step else state
         state = watch_for_power_cycle(state, status)
-        state = take_status(state, seen, status, reading, az_deg, sky, events)
+        state = take_status(state, status, reading, az_deg, given, events)
     if extra is not None:
         state = after_reply(take_stop(state, extra), extra, now_tai_s, config, events)
         state = wait_after_refusal(state, extra, now_tai_s)
@@ -78,25 +77,20 @@ def take_in(
 
 
 def order(
-    before: ControlState,
-    state: ControlState,
-    seen: Observation,
-    sky: Sky,
-    now_tai_s: float,
-    config: ControlConfig,
-    events: list[Event],
+    before: ControlState, state: ControlState, given: TickInput, config: ControlConfig, events: list[Event]
 ) -> tuple[ControlState, Orders]:
     """Aim and limit the register write, and choose the exchange beside it or in its place; no two in a row have one."""
+    seen, now_tai_s = given.seen, given.now_tai_s
     is_write_owed = before.registers.commands[-1:] == (None,)
     may_write = not seen.must_poll and _may_write(state, now_tai_s, config)
     is_turn_of_write = is_write_owed and may_write and not seen.has_room
     extra = None if seen.must_poll or is_turn_of_write else wanted_extra(state, now_tai_s, config)
     if may_write and (extra is None or seen.has_room):
-        state, first = write(state, aim(state, sky, now_tai_s, config), now_tai_s, config, events)
+        state, first = write(state, aim(state, given.sky, now_tai_s, config), now_tai_s, config, events)
         return note_asked(state, extra, now_tai_s), Orders(first, extra, tuple(events))
     state = note_no_write(state)
     if not state.is_armed(config) and state.tracking.track is not TrackState.LINK_LOST:
-        written, _ = write(state, aim(state, sky, now_tai_s, config), now_tai_s, config, events)
+        written, _ = write(state, aim(state, given.sky, now_tai_s, config), now_tai_s, config, events)
         state = note_as_if_written(state, written)
     if extra is not None and (not seen.has_room or needs_no_poll(state, extra, now_tai_s, config)):
         return note_asked(state, extra, now_tai_s), Orders(extra, None, tuple(events))

@@ -76,6 +76,11 @@ class Sky:
     fit: FitResult | None = None
     plan: PassPlan | None = None
 
+    @property
+    def is_fitted(self) -> bool:
+        """Whether the buffer is made from a fit of this pass."""
+        return self.prediction is not None and self.prediction.kind == "FITTED"
+
 
 @dataclass(frozen=True, slots=True)
 class TickInput:

@@ -7,15 +7,16 @@ that are not finite (`Pointing.is_finite`): the register limiter refuses them, a
 from dataclasses import replace
 from math import inf, isnan
 
-from acu_daemon.control.tick_input import Observation, PassPlan, Sky
+from acu_daemon.control.tick_input import PassPlan, Sky, TickInput
 from acu_daemon.drivers.sa3842.messages import Status
 from acu_daemon.model import MOST_DEG, FitResult, Prediction, Reading
 
 MOST_S = 1e12  # 30 000 years: more is no time
 
 
-def finite_only(seen: Observation, sky: Sky) -> tuple[Observation, Sky, str]:
-    """What of an observation and the sky can be used, and the names of what cannot."""
+def finite_only(given: TickInput) -> tuple[TickInput, str]:
+    """What of a tick's input can be used, and the names of what cannot."""
+    seen, sky = given.seen, given.sky
     refused: list[str] = []
     status, reading = seen.status, seen.reading
     if (status is not None and not _is_status(status)) or (reading is not None and not _is_reading(reading)):
@@ -33,7 +34,9 @@ def finite_only(seen: Observation, sky: Sky) -> tuple[Observation, Sky, str]:
     if plan is not None and not is_plan(plan):
         refused.append("plan")
         plan = None
-    return seen, Sky(prediction, fit, plan) if refused else sky, ", ".join(refused)
+    if not refused and seen is given.seen:
+        return given, ""
+    return TickInput(seen, Sky(prediction, fit, plan), given.now_tai_s), ", ".join(refused)
 
 
 def _is_status(status: Status) -> bool:

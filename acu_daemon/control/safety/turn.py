@@ -215,32 +215,6 @@ def drive_s(way_deg: float, limits: AxisLimits) -> float:
     return way_deg / rate_deg_s + 2.0 * rate_deg_s / limits.max_acceleration_deg_s2
 
 
-def stopping(watch: TurnWatch, problem: str) -> TurnWatch:
-    """The turn is doubted: the antenna is stopped."""
-    return replace(at_rest(watch), phase=Phase.STOPPING, move_to_deg=None, is_sure=False, problem=problem)
-
-
-def under_way(watch: TurnWatch, tai_s: float) -> TurnWatch:
-    """Note when the antenna was seen first in a mode that stops it, or moves it."""
-    return replace(watch, begun_tai_s=min(watch.begun_tai_s, tai_s))
-
-
-def moving(watch: TurnWatch, to_deg: float) -> TurnWatch:
-    """The antenna is moved by a few degrees on the other turn."""
-    return replace(watch, phase=Phase.MOVING, move_to_deg=to_deg, begun_tai_s=inf)
-
-
-def settled(watch: TurnWatch, learned_count: int = 0) -> TurnWatch:
-    """The turn is believed again.  learned_count: turns learned by this."""
-    count = watch.learned_count + learned_count
-    return replace(at_rest(watch), phase=Phase.BELIEVED, move_to_deg=None, learned_count=count)
-
-
-def corrected(watch: TurnWatch) -> TurnWatch:
-    """The turn was another one, as a reading shows."""
-    return replace(at_rest(watch), learned_count=watch.learned_count + 1)
-
-
 def at_rest(watch: TurnWatch) -> TurnWatch:
     """Forget the way to the goal: it begins anew."""
     return replace(watch, goal_deg=None, way_deg=0.0, begun_tai_s=inf, side=0, mark_tai_s=inf, problem="")

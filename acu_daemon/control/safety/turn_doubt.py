@@ -28,16 +28,12 @@ from acu_daemon.control.safety.fresh_start import anew
 from acu_daemon.control.safety.turn import (
     PATIENCE_S,
     Phase,
-    corrected,
+    at_rest,
     drive_s,
     half_text,
     is_pulled_round,
     locate,
-    moving,
     other_turn,
-    settled,
-    stopping,
-    under_way,
     watch_goal,
     watch_pull,
 )
@@ -92,7 +88,8 @@ def doubt(state: ControlState, config: ControlConfig, events: list[Event], why: 
     }
     events.append(Event("turn.doubted", fields, is_warning=True))
     problem = f"turn doubted: azimuth {az_deg:.1f} deg as believed, or {other_deg:.1f}" if other_deg else why
-    state = replace(state, turn=stopping(state.turn, problem))
+    turn = replace(at_rest(state.turn), phase=Phase.STOPPING, move_to_deg=None, is_sure=False, problem=problem)
+    state = replace(state, turn=turn)
     return owe_stop(release(forget_in_force(forget_motion(state))))
 
 
@@ -170,7 +167,7 @@ def _stopped(state: ControlState, status: Status, config: ControlConfig, events:
     if state.arming.is_stop_due or duty_of(status) is not Duty.STAND:
         return state
     last_tai_s, limits = state.intake.track_of_readings[-1][0], config.azimuth
-    state = replace(state, turn=under_way(state.turn, last_tai_s))
+    state = _under_way(state, last_tai_s)
     az_deg = [az for _, az, _ in state.intake.track_of_readings]
     moved_deg = max(az_deg) - min(az_deg)
     braking_s = BRAKING_MARGIN * limits.max_rate_deg_s / limits.max_acceleration_deg_s2
@@ -188,7 +185,8 @@ def _stopped(state: ControlState, status: Status, config: ControlConfig, events:
         Event("turn.tried", {"az_deg": other_deg, "believed_deg": state.intake.az_deg, "move_to_deg": move_to_deg})
     )
     state = anew(on_other_turn(state, other_deg - state.intake.az_deg))
-    return replace(state, turn=moving(state.turn, move_to_deg))
+    turn = replace(state.turn, phase=Phase.MOVING, move_to_deg=move_to_deg, begun_tai_s=inf)
+    return replace(state, turn=turn)
 
 
 def _moved(state: ControlState, status: Status, config: ControlConfig, events: list[Event]) -> tuple[ControlState, str]:
@@ -198,7 +196,7 @@ def _moved(state: ControlState, status: Status, config: ControlConfig, events: l
     has_followed = is_led and to_deg is not None and abs(az_deg - to_deg) < ARRIVED_DEG
     if not has_followed and not is_acquired(status):
         tai_s = state.intake.track_of_readings[-1][0]
-        state = replace(state, turn=under_way(state.turn, tai_s)) if is_led else state
+        state = _under_way(state, tai_s) if is_led else state
         if tai_s - state.turn.begun_tai_s <= PATIENCE_S + drive_s(2.0 * STEP_DEG, limits) or not is_watched(config):
             return state, ""
         believed_deg = other_turn(az_deg, limits)
@@ -208,8 +206,16 @@ def _moved(state: ControlState, status: Status, config: ControlConfig, events: l
     return _settled(state, learned_count=1), ""
 
 
+def _under_way(state: ControlState, tai_s: float) -> ControlState:
+    """Note when the antenna was seen first in a mode that stops it, or moves it."""
+    return replace(state, turn=replace(state.turn, begun_tai_s=min(state.turn.begun_tai_s, tai_s)))
+
+
 def _settled(state: ControlState, learned_count: int = 0) -> ControlState:
-    return replace(state, turn=settled(state.turn, learned_count))
+    """The turn is believed again.  learned_count: turns learned by this."""
+    count = state.turn.learned_count + learned_count
+    turn = replace(at_rest(state.turn), phase=Phase.BELIEVED, move_to_deg=None, learned_count=count)
+    return replace(state, turn=turn)
 
 
 def locate_azimuth(
@@ -234,7 +240,7 @@ def locate_azimuth(
     if shift_deg and near_deg is not None:
         fields = {"az_deg": az_deg, "believed_deg": az_deg - shift_deg, "sector_bit": int(status.is_sector_high)}
         events.append(Event("turn.corrected", fields, is_warning=True))
-        new = corrected(new)
+        new = replace(at_rest(new), learned_count=new.learned_count + 1)
     return state if new is turn else replace(state, turn=new), az_deg
 
 

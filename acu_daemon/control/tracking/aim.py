@@ -43,8 +43,7 @@ def _rest(state: ControlState, *, is_followed: bool) -> Pointing:
     registers = state.registers
     if is_followed and registers.axis_az is not None and registers.axis_el is not None:
         return Pointing(registers.axis_az.position_deg, registers.axis_el.position_deg, 0.0, 0.0)
-    el_deg = state.intake.status.el_deg if state.intake.status is not None else 0.0
-    return Pointing(state.intake.az_deg, el_deg, 0.0, 0.0)
+    return Pointing(state.intake.az_deg, state.intake.el_deg, 0.0, 0.0)
 
 
 def _on_turn(az_deg: float, state: ControlState, config: ControlConfig, *, is_followed: bool) -> float:

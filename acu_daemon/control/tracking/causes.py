@@ -5,7 +5,7 @@ from math import cos, hypot, radians
 
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState, StartStage
-from acu_daemon.control.tick_input import Sky
+from acu_daemon.control.tick_input import Sky, TickInput
 from acu_daemon.control.tracking.approach import ACQUIRE_LEAD_S, lead_s
 from acu_daemon.control.tracking.pass_plan import pass_end_tai_s
 from acu_daemon.control.tracking.register_limiter import within_limits
@@ -23,30 +23,30 @@ BEFORE = frozenset({TrackState.IDLE, TrackState.PREPOSITION})  # only there it m
 MODE_SETTLE_S = 3.0  # a MODE SELECT takes a moment to show; only later is a left mode the ACU's own doing
 
 
-def find_causes(state: ControlState, sky: Sky, silence_s: float, now_tai_s: float, config: ControlConfig) -> set[Cause]:
+def find_causes(state: ControlState, given: TickInput, config: ControlConfig) -> set[Cause]:
     """All causes that are present; the table decides which of them matters."""
     status = state.intake.status
-    if silence_s > LINK_SILENCE_S or status is None:
+    if given.seen.silence_s > LINK_SILENCE_S or status is None:
         return {Cause.LINK_SILENT}
     if state.latch.problem:
         return {Cause.LINK_BACK, Cause.LATCHED}
     causes = {Cause.LINK_BACK} | _of_status(status, is_stow_kept=state.intake.is_stow_kept)
     if not state.is_armed(config):
-        return causes | _of_others(state, status, sky, now_tai_s, config)
+        return causes | _of_others(state, status, given, config)
     if state.startup.stage is StartStage.READY:
-        causes |= _of_signal(state, status, sky, now_tai_s, config)
-        causes |= _of_plan(state, status, sky, now_tai_s, config)
-        causes |= _of_time(state, sky, now_tai_s, config)
+        causes |= _of_signal(state, status, given, config)
+        causes |= _of_plan(state, status, given, config)
+        causes |= _of_time(state, status, given, config)
     return causes
 
 
-def _of_others(state: ControlState, status: Status, sky: Sky, now_tai_s: float, config: ControlConfig) -> set[Cause]:
+def _of_others(state: ControlState, status: Status, given: TickInput, config: ControlConfig) -> set[Cause]:
     """What the ACU does under somebody else's hand, while the daemon is disarmed or in shadow."""
     if not status.is_autotrack_selected:
         return {Cause.HANDS_OFF}
-    causes = _of_signal(state, status, sky, now_tai_s, config)
+    causes = _of_signal(state, status, given, config)
     still = {Cause.PASS_OVER, Cause.STILL_SELECTED, Cause.STILL_FITTED}
-    return causes | (_of_plan(state, status, sky, now_tai_s, config) & still)
+    return causes | (_of_plan(state, status, given, config) & still)
 
 
 def _of_status(status: Status, *, is_stow_kept: bool) -> set[Cause]:
@@ -66,23 +66,24 @@ def is_acquired(status: Status) -> bool:
     return status.mode is AcuMode.AUTOTRACK and status.is_acquired
 
 
-def _of_signal(state: ControlState, status: Status, sky: Sky, now_tai_s: float, config: ControlConfig) -> set[Cause]:
-    has_fit = sky.prediction is not None and sky.prediction.kind == "FITTED"
+def _of_signal(state: ControlState, status: Status, given: TickInput, config: ControlConfig) -> set[Cause]:
+    sky = given.sky
     causes: set[Cause] = set()
     if sky.prediction is not None:
-        causes.add(Cause.FIT if has_fit else Cause.FIT_LEFT)
+        causes.add(Cause.FIT if sky.is_fitted else Cause.FIT_LEFT)
     if is_acquired(status):
-        if _is_ours(state, status, sky, now_tai_s, config):
-            causes.add(Cause.ACQUIRED_FITTED if has_fit else Cause.ACQUIRED)
-        if has_fit and state.tracking.track is TrackState.HOLD_FITTED:
+        if _is_ours(state, status, given, config):
+            causes.add(Cause.ACQUIRED_FITTED if sky.is_fitted else Cause.ACQUIRED)
+        if sky.is_fitted and state.tracking.track is TrackState.HOLD_FITTED:
             causes.add(Cause.ACQUIRED)
     else:
         causes.add(Cause.LOST)
     return causes
 
 
-def _is_ours(state: ControlState, status: Status, sky: Sky, now_tai_s: float, config: ControlConfig) -> bool:
+def _is_ours(state: ControlState, status: Status, given: TickInput, config: ControlConfig) -> bool:
     """Whether what autotrack holds can be this pass: late enough, and where it was found so, near the path."""
+    sky, now_tai_s = given.sky, given.now_tai_s
     if sky.plan is None or now_tai_s < sky.plan.rise_tai_s - ACQUIRE_LEAD_S:
         return False
     if state.tracking.track not in BEFORE:
@@ -97,8 +98,8 @@ def _is_ours(state: ControlState, status: Status, sky: Sky, now_tai_s: float, co
     )
 
 
-def _of_plan(state: ControlState, status: Status, sky: Sky, now_tai_s: float, config: ControlConfig) -> set[Cause]:
-    plan = sky.plan
+def _of_plan(state: ControlState, status: Status, given: TickInput, config: ControlConfig) -> set[Cause]:
+    sky, plan, now_tai_s = given.sky, given.sky.plan, given.now_tai_s
     if plan is None:
         return set()
     if now_tai_s > pass_end_tai_s(plan, sky):
@@ -129,16 +130,15 @@ def _of_place(
     Not the same bearing on another turn of the wrap; but in the pass a signal from there is taken on any turn, without
     a move first: which turn is the true one may be in doubt.
     """
-    has_fit = sky.prediction is not None and sky.prediction.kind == "FITTED"
     distance_deg = _distance_deg(state, status, target)
     is_on_turn = abs(state.intake.az_deg - target.az_deg) < 90.0
     is_there = status.mode is AcuMode.REMOTE and is_on_turn and distance_deg < ON_POINT_BEAMS * config.beamwidth_deg
     is_heard = is_in_pass and not is_on_turn and status.is_acquired and status.mode in (AcuMode.REMOTE, AcuMode.STANDBY)
     causes: set[Cause] = set()
     if is_there or (is_heard and distance_deg < HEARD_BEAMS * config.beamwidth_deg):
-        causes.add(Cause.ON_POINT_FITTED if has_fit else Cause.ON_POINT)
+        causes.add(Cause.ON_POINT_FITTED if sky.is_fitted else Cause.ON_POINT)
     if distance_deg < RESUME_DEG:
-        if has_fit:
+        if sky.is_fitted:
             causes.add(Cause.STILL_FITTED)
         if status.is_autotrack_selected and status.follows_registers:
             causes.add(Cause.STILL_SELECTED)
@@ -160,28 +160,21 @@ def _distance_deg(state: ControlState, status: Status, target: Pointing) -> floa
     return sky_angle_deg(state.intake.az_deg, status.el_deg, target.az_deg, target.el_deg) - lag_deg
 
 
-def _of_time(state: ControlState, sky: Sky, now_tai_s: float, config: ControlConfig) -> set[Cause]:
+def _of_time(state: ControlState, status: Status, given: TickInput, config: ControlConfig) -> set[Cause]:
+    sky, now_tai_s, track = given.sky, given.now_tai_s, state.tracking.track
     in_state_s = now_tai_s - state.tracking.entered_tai_s
     causes: set[Cause] = set()
-    status = state.intake.status
-    if (
-        status is not None
-        and in_state_s > MODE_SETTLE_S
-        and not status.is_autotrack_selected
-        and status.mode in (AcuMode.STANDBY, AcuMode.REMOTE)
-    ):
+    is_left = not status.is_autotrack_selected and status.mode in (AcuMode.STANDBY, AcuMode.REMOTE)
+    if is_left and in_state_s > MODE_SETTLE_S:
         causes.add(Cause.MODE_LEFT)
-    if state.tracking.track is TrackState.ACQUIRE_TLE and sky.plan is not None:
+    if track is TrackState.ACQUIRE_TLE and sky.plan is not None:
         waiting_s = now_tai_s - max(state.tracking.entered_tai_s, sky.plan.rise_tai_s)
         if waiting_s > config.acquire_s:
             causes.add(Cause.ACQUIRE_OVER)
-    is_glimpse = (
-        state.tracking.track is TrackState.HOLD_TLE and not state.signal.has_locked
-    )  # it has shown nothing worth a long hold
+    is_glimpse = track is TrackState.HOLD_TLE and not state.signal.has_locked  # nothing worth a long hold
     hold_s = min(config.hold_s, config.acquire_s) if is_glimpse else config.hold_s
-    if state.tracking.track in HOLDING and now_tai_s - state.tracking.hold_from_tai_s > hold_s:
+    if track in HOLDING and now_tai_s - state.tracking.hold_from_tai_s > hold_s:
         causes.add(Cause.HOLD_OVER)
-    if state.tracking.track is TrackState.SEARCH and in_state_s > config.search_s:
-        has_fit = sky.prediction is not None and sky.prediction.kind == "FITTED"
-        causes.add(Cause.SEARCH_OVER_FITTED if has_fit else Cause.SEARCH_OVER)
+    if track is TrackState.SEARCH and in_state_s > config.search_s:
+        causes.add(Cause.SEARCH_OVER_FITTED if sky.is_fitted else Cause.SEARCH_OVER)
     return causes

@@ -10,7 +10,7 @@ from math import isfinite
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.orders import Event
 from acu_daemon.control.state import ControlState, PathOffset, Signal
-from acu_daemon.control.tick_input import Observation, Sky
+from acu_daemon.control.tick_input import Sky, TickInput
 from acu_daemon.control.tracking.causes import is_acquired
 from acu_daemon.control.tracking.search import forget_search
 from acu_daemon.control.tracking.state_table import AUTOTRACKING, TrackState
@@ -43,10 +43,9 @@ def resume_pass(state: ControlState) -> ControlState:
     return replace(state, signal=replace(state.signal, has_acquired=True))
 
 
-def learn_of_signal(
-    state: ControlState, seen: Observation, sky: Sky, config: ControlConfig, events: list[Event]
-) -> ControlState:
+def learn_of_signal(state: ControlState, given: TickInput, config: ControlConfig, events: list[Event]) -> ControlState:
     """Take a reading of the satellite's own signal, by the state that the table has just given."""
+    seen = given.seen
     if seen.status is None or seen.reading is None:
         return state
     signal, track, tai_s = state.signal, state.tracking.track, seen.reading.tai_s
@@ -60,7 +59,7 @@ def learn_of_signal(
     if signal.acquired_since_tai_s is None or not signal.has_acquired or has_locked is not signal.has_locked:
         new = replace(signal, acquired_since_tai_s=since_tai_s, has_acquired=True, has_locked=has_locked)
     if track is TrackState.AUTOTRACK_TLE and seen.is_in_step:
-        new = _learn_offset(new, seen.reading, sky, config, events)
+        new = _learn_offset(new, seen.reading, given.sky, config, events)
     return state if new is signal else replace(state, signal=new)
 
 

@@ -13,7 +13,7 @@ from acu_daemon.control.registers import forget_writes
 from acu_daemon.control.safety.axis_latch import forget_motion
 from acu_daemon.control.startup import begin_after_lost_link
 from acu_daemon.control.state import ControlState
-from acu_daemon.control.tick_input import Observation, Sky
+from acu_daemon.control.tick_input import Sky, TickInput
 from acu_daemon.control.tracking.causes import find_causes
 from acu_daemon.control.tracking.late_arrival import lateness
 from acu_daemon.control.tracking.state_table import HOLDING, TrackState, transition
@@ -21,13 +21,11 @@ from acu_daemon.control.tracking.state_table import HOLDING, TrackState, transit
 ALARMS = (TrackState.LINK_LOST, TrackState.FAULT, TrackState.SEARCH)
 
 
-def walk(
-    state: ControlState, seen: Observation, sky: Sky, now_tai_s: float, config: ControlConfig, events: list[Event]
-) -> ControlState:
+def walk(state: ControlState, given: TickInput, config: ControlConfig, events: list[Event]) -> ControlState:
     """Go to the next state, where a cause of it is present."""
-    causes = find_causes(state, sky, seen.silence_s, now_tai_s, config)
-    tracking = state.tracking
-    if tracking.track in HOLDING and _is_sure(sky, now_tai_s, config):
+    causes = find_causes(state, given, config)
+    tracking, now_tai_s = state.tracking, given.now_tai_s
+    if tracking.track in HOLDING and _is_sure(given.sky, now_tai_s, config):
         tracking = replace(tracking, hold_from_tai_s=now_tai_s)
     step = transition(tracking.track, causes)
     if step is None:
@@ -36,7 +34,7 @@ def walk(
     fields = {"state": str(track), "before": str(before), "cause": str(cause)}
     events.append(Event("state.changed", fields, is_warning=track in ALARMS))
     if track is TrackState.PREPOSITION:
-        events += lateness(state, sky, now_tai_s, config)
+        events += lateness(state, given.sky, now_tai_s, config)
     begins_hold = track in HOLDING and before not in HOLDING
     hold_from_tai_s = now_tai_s if begins_hold else tracking.hold_from_tai_s
     tracking = replace(tracking, track=track, entered_tai_s=now_tai_s, hold_from_tai_s=hold_from_tai_s)
