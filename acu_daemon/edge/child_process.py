@@ -26,6 +26,13 @@ async def start(*command: str, **pipes: Any) -> asyncio.subprocess.Process:
         raise OSError(f"{error}") from None
 
 
+def release(process: asyncio.subprocess.Process) -> None:
+    """Close our ends of a process' pipes, though a grandchild may keep the others; asyncio has no word for it."""
+    transport: asyncio.SubprocessTransport | None = getattr(process, "_transport", None)
+    if transport is not None:
+        transport.close()
+
+
 def _watch_without_a_thread() -> None:
     """Python 3.11 watches each child from a thread of its own, later ones do so only where the kernel is old."""
     if sys.version_info >= (3, 12):
