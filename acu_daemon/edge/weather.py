@@ -7,9 +7,7 @@ then the values of [atmosphere] hold.  What comes by UDP may be anybody's; at wo
 at this height.
 """
 
-import asyncio
 import json
-import socket
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,12 +16,12 @@ import structlog
 
 from acu_daemon.config.antenna_tables import AtmosphereSection
 from acu_daemon.edge.carry_over_file import reason_of
+from acu_daemon.edge.newest_text import NewestText
 from acu_daemon.model import Station
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 
 VALUES = ("pressure_hpa", "temperature_c", "humidity_percent")
 MOST_AHEAD_S = 60.0  # of our clock: a weather station's may be that wrong
-_LARGEST_BYTES = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,53 +53,41 @@ def weather_of(text: bytes, given: AtmosphereSection, station: Station, now_tai_
 
 
 class WeatherReader:
-    """Hands out the newest usable weather of the file and of the datagrams.  Owned by the loop.
-
-    Datagrams are only kept as they come, the newest of them; whoever asks pays for reading it.
-    """
+    """Hands out the newest usable weather of the file and of the datagrams.  Owned by the loop."""
 
     def __init__(self, given: AtmosphereSection, station: Station, config: Path) -> None:
         self._given, self._station = given, station
-        self._file = None if given.weather_file is None else config / given.weather_file
-        self._transport: asyncio.DatagramTransport | None = None
+        is_used = given.has_refraction
+        file = None if given.weather_file is None or not is_used else config / given.weather_file
+        self._source = NewestText(given.weather_udp if is_used else None, file)
         self._newest: Weather | None = None
-        self._datagram: bytes | None = None
         self._said = self.problem = ""  # problem: what was wrong at the last look
         self._log: Any = structlog.get_logger("weather")
 
     async def open(self) -> None:
         """Listen for datagrams, where asked; an address that cannot be had is told, and no reason not to track."""
-        address = self._given.weather_udp
-        if address is None or not self._given.has_refraction:
-            return
-        host, _, port = address.rpartition(":")
-        try:
-            self._transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
-                lambda: _Newest(self), local_addr=(host.strip("[]"), int(port))
+        if reason := await self._source.open():
+            self._log.warning(
+                "weather.no_socket", address=self._given.weather_udp, reason=reason, in_force="[atmosphere]"
             )
-        except (OSError, socket.gaierror, UnicodeError) as error:
-            reason = getattr(error, "strerror", None) or str(error)
-            self._log.warning("weather.no_socket", address=address, reason=reason, in_force="[atmosphere]")
 
     def close(self) -> None:
-        if self._transport is not None:
-            self._transport.close()
+        self._source.close()
 
     def take(self, datagram: bytes) -> None:
         """Keep a datagram."""
-        self._datagram = datagram
+        self._source.take(datagram)
 
     def now(self, now_tai_s: float) -> AtmosphereSection:
         """[atmosphere] as it is now.  Reads the file: call it beside the loop, one at a time."""
         found: list[Weather] = []
-        reasons: list[str] = []
-        datagram, self._datagram = self._datagram, None
-        for source, text in (("weather_udp", datagram), ("weather_file", self._contents(reasons))):
-            if text is not None:
-                try:
-                    found.append(weather_of(text, self._given, self._station, now_tai_s))
-                except ValueError as error:
-                    reasons.append(f"{source}: {error}")
+        texts, unread = self._source.newest()
+        reasons = [unread] if unread else []
+        for source, text in texts:
+            try:
+                found.append(weather_of(text, self._given, self._station, now_tai_s))
+            except ValueError as error:
+                reasons.append(f"weather_{source}: {error}")
         if self._newest is not None:
             if now_tai_s - self._newest.tai_s <= self._given.weather_max_age_s:
                 found.append(self._newest)
@@ -111,19 +97,6 @@ class WeatherReader:
         self.problem = "; ".join(reasons)
         return self._given if self._newest is None else self._newest.atmosphere
 
-    def _contents(self, reasons: list[str]) -> bytes | None:
-        if self._file is None or not self._given.has_refraction:
-            return None
-        try:
-            if self._file.exists() and not self._file.is_file():  # a pipe would keep its reader waiting
-                reasons.append(f"{self._file}: expected a file")
-                return None
-            with self._file.open("rb") as file:
-                return file.read(_LARGEST_BYTES)
-        except OSError as error:
-            reasons.append(f"{self._file}: {error.strerror}")
-            return None
-
     def tell(self) -> None:
         """Log what was wrong, where it is another kind of thing than before: ages in seconds change at every look."""
         reason = self.problem
@@ -132,11 +105,3 @@ class WeatherReader:
             in_force = "[atmosphere]" if self._newest is None else f"of {utc_text(self._newest.tai_s, 0)}"
             self._log.warning("weather.ignored", reason=reason, in_force=in_force)
         self._said = kind
-
-
-class _Newest(asyncio.DatagramProtocol):
-    def __init__(self, reader: WeatherReader) -> None:
-        self._reader = reader
-
-    def datagram_received(self, data: bytes, _address: Any) -> None:
-        self._reader.take(data[:_LARGEST_BYTES])
