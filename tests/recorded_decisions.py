@@ -16,9 +16,7 @@ from acu_daemon.drivers.sa3842.messages import WriteAndPoll, WriteRegisters, com
 
 RECORDED = Path(__file__).parent / "recorded_decisions.txt"
 EVERY = 10  # ticks
-NOTE = (
-    "# What scripts/record_decisions.py has recorded.  A change that is meant: run it again, and read the difference.\n"
-)
+NOTE = "# What scripts/record.py has recorded.  A change that is meant: run it again, and read the difference.\n"
 
 
 def facts(state: ControlState, orders: Orders, config: ControlConfig) -> dict[str, Any]:

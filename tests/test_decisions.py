@@ -37,5 +37,5 @@ def is_same(now: str, then: str) -> bool:
 def test_what_a_tick_decides_is_as_recorded_or_the_record_is_made_anew_on_purpose(seed: int) -> None:
     found, then = list(lines(*run_of(seed))), recorded()[seed]
     for here, there in zip(found, then, strict=False):
-        assert is_same(here, there), "meant?  then: scripts/record_decisions.py, and read the difference"
+        assert is_same(here, there), "meant?  then: scripts/record.py, and read the difference"
     assert len(found) == len(then)
