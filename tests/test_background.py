@@ -24,6 +24,7 @@ from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.background import BESIDE, PAST_S, Background
 from acu_daemon.model import AxisLimits, Correction, FitResult, Model, Prediction, Reading
 from acu_daemon.pointing.envelope import Envelope
+from acu_daemon.pointing.keyhole import longest_window_s
 
 AZIMUTH, ELEVATION = AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0)
 WHERE, SOURCE = site(6.0, 3.0), circular()
@@ -33,7 +34,7 @@ NOW = RISE + 100.0
 PLAN = PassPlan(RISE, RISE + 600.0, RISE, 50.0, 5.0)
 CONFIG_HERE = ControlConfig(Envelope(AZIMUTH, ELEVATION))
 HORIZON_S, LOW_S = 90.0, 30.0
-WINDOW_S = 13.474  # in which an azimuth with 95 % of 20 deg/s and 10 deg/s2 makes half a turn
+WINDOW_S = longest_window_s(AZIMUTH)
 FIT = FitResult("full", Correction(), NOW, 100, 0, 0.01, 0.1, 0.01)
 
 
@@ -177,8 +178,8 @@ async def test_the_buffer_that_is_asked_for_begins_before_now_and_reaches_beyond
     ("from_s", "to_s", "past_s", "ahead_s"),
     [
         (-1000.0, 1000.0, 10.0, 10.0),
-        (-25.0, 1000.0, 10.0, 10.0),
-        (-18.0, 1000.0, 18.0 - WINDOW_S - PAST_S, 10.0),
+        (-30.0, 1000.0, 10.0, 10.0),
+        (-20.0, 1000.0, 20.0 - WINDOW_S - PAST_S, 10.0),
         (-13.0, 1000.0, 0.0, 10.0),
         (-1000.0, 95.0, 10.0, 5.0),
         (-1000.0, 80.0, 10.0, 0.0),
