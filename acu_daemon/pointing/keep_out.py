@@ -12,7 +12,7 @@ import numpy as np
 
 from acu_daemon.model import Site, sky_angle_deg
 from acu_daemon.orbit.sun import sun_direction_deg
-from acu_daemon.units import wrap_180
+from acu_daemon.units import DEG
 
 Policy = Literal["avoid", "warn", "off"]
 NODE_S = 60.0  # the sun between two of these: a chord of 0.25 deg, 0.0002 deg off its arc
@@ -47,12 +47,12 @@ class KeepOut:
         return ((self.az_to_deg - self.az_from_deg) % WHOLE_TURN_DEG or WHOLE_TURN_DEG) / 2.0
 
     def clearance_deg(self, az_deg: float, el_deg: float) -> float:
-        half_deg = self.half_width_deg
-        beside_deg = abs(wrap_180(az_deg - self.az_from_deg - half_deg)) - half_deg
-        if half_deg >= 180.0:
-            beside_deg = -180.0
+        half_deg = ((self.az_to_deg - self.az_from_deg) % WHOLE_TURN_DEG or WHOLE_TURN_DEG) / 2.0
         over_deg = max(self.el_from_deg - el_deg, el_deg - self.el_to_deg)
-        beside_deg *= cos(radians(el_deg))
+        if half_deg >= 180.0:
+            return over_deg
+        beside_deg = abs((az_deg - self.az_from_deg - half_deg + 180.0) % 360.0 - 180.0) - half_deg
+        beside_deg *= cos(el_deg * DEG)
         if beside_deg > 0.0 and over_deg > 0.0:
             return hypot(beside_deg, over_deg)
         return max(beside_deg, over_deg)
@@ -74,7 +74,9 @@ class Disc:
     radius_deg: float
 
     def clearance_deg(self, az_deg: float, el_deg: float) -> float:
-        return sky_angle_deg(self.az_deg, self.el_deg, az_deg, el_deg) - self.radius_deg
+        a, h, el = az_deg * DEG, el_deg * DEG, self.el_deg * DEG
+        d_az, d_el = sin((a - self.az_deg * DEG) / 2.0), sin((h - el) / 2.0)
+        return 2.0 * asin(min(1.0, sqrt(d_el * d_el + cos(h) * cos(el) * d_az * d_az))) / DEG - self.radius_deg
 
     def box_deg(self, margin_deg: float) -> tuple[float, float, float, float]:
         """The greatest azimuth beside a disc is where sin(width) = sin(radius) / cos(elevation)."""
@@ -118,11 +120,17 @@ class Sun:
         return degrees(atan2(x, y)), degrees(atan2(z, sqrt(x * x + y * y)))
 
     def at(self, tai_s: float) -> Disc:
-        return Disc("the sun", *self.direction_deg(tai_s), self.radius_deg)
+        return _disc(self, tai_s)
 
     def angle_deg(self, az_deg: float, el_deg: float, tai_s: float) -> float:
         """Between the sun's middle and a direction."""
         return sky_angle_deg(*self.direction_deg(tai_s), az_deg, el_deg)
+
+
+@lru_cache(maxsize=4)
+def _disc(sun: Sun, tai_s: float) -> Disc:
+    """All that a tick asks is of one instant."""
+    return Disc("the sun", *sun.direction_deg(tai_s), sun.radius_deg)
 
 
 @lru_cache(maxsize=4096)

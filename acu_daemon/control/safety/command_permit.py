@@ -29,6 +29,7 @@ from acu_daemon.drivers.sa3842.messages import (
     WriteRegisters,
     command_text,
 )
+from acu_daemon.pointing.envelope import Envelope
 
 READS = (Identify, Poll, ReadRegisters, ReadFaults, ReadParameter)
 SELECTED_MODES = (AcuMode.STANDBY, AcuMode.REMOTE, AcuMode.AUTOTRACK)
@@ -70,9 +71,9 @@ def _of_kind(command: Command, state: ControlState, now_tai_s: float, config: Co
     stage, is_ready = state.startup.stage, state.startup.stage is StartStage.READY
     match command:
         case WriteAndPoll(az_deg=az_deg, el_deg=el_deg) if is_ready:
-            return _of_angles(az_deg, el_deg, now_tai_s, config)
+            return of_angles(az_deg, el_deg, now_tai_s, config.envelope)
         case WriteRegisters(az_deg=az_deg, el_deg=el_deg) if stage >= StartStage.SECTOR_FREE:
-            return _of_angles(az_deg, el_deg, now_tai_s, config)
+            return of_angles(az_deg, el_deg, now_tai_s, config.envelope)
         case SelectMode(mode=mode) if is_ready and mode in SELECTED_MODES:
             return ""
         case SelectBackup(backup=Backup.REMOTE) if is_ready:
@@ -82,8 +83,9 @@ def _of_kind(command: Command, state: ControlState, now_tai_s: float, config: Co
     return "not in its place"
 
 
-def _of_angles(az_deg: float, el_deg: float, now_tai_s: float, config: ControlConfig) -> str:
+def of_angles(az_deg: float, el_deg: float, now_tai_s: float, envelope: Envelope) -> str:
+    """Why registers must not be written with such angles; empty: they may."""
     for name, angle_deg in (("azimuth", az_deg), ("elevation", el_deg)):
         if not isfinite(angle_deg):
             return f"{name} is not a finite angle"
-    return config.envelope.why_not(az_deg, el_deg, now_tai_s, LSB_DEG)
+    return envelope.why_not(az_deg, el_deg, now_tai_s, LSB_DEG)

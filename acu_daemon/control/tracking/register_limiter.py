@@ -11,6 +11,7 @@ from math import copysign, cos, isfinite, radians
 
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState
+from acu_daemon.control.tracking.keep_clear import AROUND_SHARE, braking, led_clear
 from acu_daemon.drivers.sa3842.angles import clamp_deg
 from acu_daemon.model import AxisLimits, Pointing
 from acu_daemon.pointing.axis import AxisState, step
@@ -49,6 +50,12 @@ def limit(
         az, el = replace(az, rate_deg_s=0.0), replace(el, rate_deg_s=0.0)
         return Passed(_legal(az, config.azimuth), _legal(el, config.elevation), True, "not a finite angle")
     wanted, limited = within_limits(wanted, az.position_deg, config)
+    azimuth, elevation, has_zones = config.azimuth, config.elevation, config.envelope.has_zones
+    if has_zones:
+        led = led_clear(wanted, az, el, now_tai_s, config.envelope, is_followed=is_followed)
+        wanted, limited = led.wanted, limited or led.told
+        if led.is_around:
+            azimuth, elevation = _share(azimuth, AROUND_SHARE, 1.0), _share(elevation, AROUND_SHARE, 1.0)
     new_az, new_el = (
         AxisState(wanted.az_deg, wanted.az_rate_deg_s),
         AxisState(wanted.el_deg, wanted.el_rate_deg_s),
@@ -57,8 +64,10 @@ def limit(
         half_beam_deg = config.beamwidth_deg / 2
         half_beam_az_deg = half_beam_deg / max(cos(radians(wanted.el_deg)), LEAST_COS_EL)
         antenna_az, antenna_el = _antenna(state, now_tai_s)
-        new_az = _reachable(az, _waiting(az, antenna_az, new_az), dt_s, config.azimuth, half_beam_az_deg)
-        new_el = _reachable(el, _waiting(el, antenna_el, new_el), dt_s, config.elevation, half_beam_deg)
+        new_az = _reachable(az, _waiting(az, antenna_az, new_az), dt_s, azimuth, half_beam_az_deg)
+        new_el = _reachable(el, _waiting(el, antenna_el, new_el), dt_s, elevation, half_beam_deg)
+        if has_zones:
+            new_az, new_el = braking((az, el), (new_az, new_el), dt_s, now_tai_s, config.envelope)
     is_held_back = new_az.position_deg != wanted.az_deg or new_el.position_deg != wanted.el_deg
     return Passed(_legal(new_az, config.azimuth), _legal(new_el, config.elevation), is_held_back, limited=limited)
 
