@@ -82,15 +82,18 @@ def watch_axis(watch: AxisWatch, seen: AxisSeen, limits: AxisLimits, bounds: Bou
     if last is not None and seen.tai_s <= last.tai_s:
         return watch, ""
     if seen.duty is Duty.UNWATCHED or last is None or _is_new(last, seen, limits, bounds):
-        return _marked(AxisWatch(seen), seen, abs(seen.rate_deg_s)), ""
-    watch = replace(watch, last=seen, fast_since_tai_s=_fast_since_tai_s(watch, seen, limits, bounds))
-    if seen.tai_s - watch.fast_since_tai_s >= FAST_S:
+        return _marked(seen, inf, abs(seen.rate_deg_s)), ""
+    fast_since_tai_s = _fast_since_tai_s(watch, seen, limits, bounds)
+    is_fast = seen.tai_s - fast_since_tai_s >= FAST_S
+    is_judged = seen.duty is Duty.STAND or (seen.duty is Duty.FOLLOW and seen.gap_deg is not None)
+    if not is_fast and not is_judged:
+        return _marked(seen, fast_since_tai_s), ""
+    watch = replace(watch, last=seen, fast_since_tai_s=fast_since_tai_s)
+    if is_fast:
         return watch, "moves faster than its drive can"
-    if seen.duty is Duty.STAND:
-        return _watch_standing(watch, seen, limits, bounds)
     if seen.duty is Duty.FOLLOW and seen.gap_deg is not None:
         return _watch_following(watch, seen, seen.gap_deg, limits, bounds)
-    return _marked(watch, seen), ""
+    return _watch_standing(watch, seen, limits, bounds)
 
 
 def _is_new(last: AxisSeen, seen: AxisSeen, limits: AxisLimits, bounds: Bounds) -> bool:
@@ -101,8 +104,8 @@ def _is_new(last: AxisSeen, seen: AxisSeen, limits: AxisLimits, bounds: Bounds) 
     return seen.duty is not last.duty or span_s > GAP_S or is_jump
 
 
-def _marked(watch: AxisWatch, seen: AxisSeen, wrong_deg_s: float = 0.0, side: int = 0) -> AxisWatch:
-    return AxisWatch(watch.last, side, seen.tai_s, seen.angle_deg, wrong_deg_s, fast_since_tai_s=watch.fast_since_tai_s)
+def _marked(seen: AxisSeen, fast_since_tai_s: float, wrong_deg_s: float = 0.0, side: int = 0) -> AxisWatch:
+    return AxisWatch(seen, side, seen.tai_s, seen.angle_deg, wrong_deg_s, fast_since_tai_s=fast_since_tai_s)
 
 
 def _fast_since_tai_s(watch: AxisWatch, seen: AxisSeen, limits: AxisLimits, bounds: Bounds) -> float:
@@ -130,7 +133,7 @@ def _watch_standing(watch: AxisWatch, seen: AxisSeen, limits: AxisLimits, bounds
     if is_wrong:
         return watch, "moves without a command" if wrong_s >= bounds.error_s else ""
     if seen.tai_s - watch.mark_tai_s > bounds.error_s + braking_s:
-        return _marked(watch, seen), ""
+        return _marked(seen, watch.fast_since_tai_s), ""
     return watch, ""
 
 
@@ -140,10 +143,10 @@ def _watch_following(
     error_deg = bounds.error_deg / seen.scale
     side = 0 if abs(gap_deg) <= error_deg else (1 if gap_deg > 0 else -1)
     if side == 0:
-        return _marked(watch, seen), ""
+        return _marked(seen, watch.fast_since_tai_s), ""
     nearer_deg = side * (seen.angle_deg - watch.mark_deg)
     if side != watch.side or nearer_deg >= PROGRESS_SHARE * error_deg:
-        return _marked(watch, seen, max(-side * seen.rate_deg_s, 0.0), side), ""
+        return _marked(seen, watch.fast_since_tai_s, max(-side * seen.rate_deg_s, 0.0), side), ""
     braking_deg, braking_s = _braking(watch, limits)
     watch, wrong_s = _wrong_for_s(watch, seen, is_wrong=nearer_deg < -error_deg - braking_deg)
     if wrong_s >= AWAY_S:

@@ -8,8 +8,7 @@ from dataclasses import replace
 from math import inf, isnan
 
 from acu_daemon.control.tick_input import PassPlan, Sky, TickInput
-from acu_daemon.drivers.sa3842.messages import Status
-from acu_daemon.model import MOST_DEG, FitResult, Prediction, Reading
+from acu_daemon.model import MOST_DEG, FitResult, Prediction
 
 MOST_S = 1e12  # 30 000 years: more is no time
 
@@ -19,7 +18,9 @@ def finite_only(given: TickInput) -> tuple[TickInput, str]:
     seen, sky = given.seen, given.sky
     refused: list[str] = []
     status, reading = seen.status, seen.reading
-    if (status is not None and not _is_status(status)) or (reading is not None and not _is_reading(reading)):
+    if (status is not None and not _are_angles(status.az_deg, status.el_deg)) or (
+        reading is not None and not (abs(reading.tai_s) <= MOST_S and _are_angles(reading.az_deg, reading.el_deg))
+    ):
         refused.append("status")
         seen = replace(seen, status=None, reading=None)
     if isnan(seen.silence_s):
@@ -39,32 +40,20 @@ def finite_only(given: TickInput) -> tuple[TickInput, str]:
     return TickInput(seen, Sky(prediction, fit, plan), given.now_tai_s), ", ".join(refused)
 
 
-def _is_status(status: Status) -> bool:
-    return _are_angles(status.az_deg, status.el_deg)
-
-
-def _is_reading(reading: Reading) -> bool:
-    return _are_times(reading.tai_s) and _are_angles(reading.az_deg, reading.el_deg)
-
-
 def _is_prediction(prediction: Prediction) -> bool:
-    return _are_times(prediction.start_tai_s, prediction.end_tai_s) and prediction.step_s > 0.0
+    return abs(prediction.start_tai_s) <= MOST_S and abs(prediction.end_tai_s) <= MOST_S and prediction.step_s > 0.0
 
 
 def is_fit(fit: FitResult) -> bool:
     """Whether what the decision reads of a fit is finite."""
-    return _are_times(fit.along_s, fit.at_tai_s) and _are_angles(fit.across_deg)
+    return abs(fit.along_s) <= MOST_S and abs(fit.at_tai_s) <= MOST_S and abs(fit.across_deg) <= MOST_DEG
 
 
 def is_plan(plan: PassPlan) -> bool:
     """Whether a plan is finite."""
-    are_times = _are_times(plan.rise_tai_s, plan.set_tai_s, plan.start_tai_s)
+    are_times = abs(plan.rise_tai_s) <= MOST_S and abs(plan.set_tai_s) <= MOST_S and abs(plan.start_tai_s) <= MOST_S
     return are_times and _are_angles(plan.start_az_deg, plan.start_el_deg)
 
 
-def _are_times(*values_s: float) -> bool:
-    return all(abs(value_s) <= MOST_S for value_s in values_s)
-
-
-def _are_angles(*values_deg: float) -> bool:
-    return all(abs(value_deg) <= MOST_DEG for value_deg in values_deg)
+def _are_angles(az_deg: float, el_deg: float) -> bool:
+    return abs(az_deg) <= MOST_DEG and abs(el_deg) <= MOST_DEG
