@@ -345,6 +345,7 @@ class Pass:
     culmination_el_deg: float
     culmination_az_deg: float
     set_az_deg: float
+    hidden_tai_s: tuple[tuple[float, float], ...] = ()  # from and to: behind the station's skyline
 
     @property
     def duration_s(self) -> float:

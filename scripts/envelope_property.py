@@ -7,7 +7,9 @@ What it does
   by a person's hand, a standstill, garbage, and registers that are not followed.  Each step goes through the register
   limiter; what comes out is asked of the envelope, and whether axes that brake from it stand outside too.
 
-Prints one line with the counts.  Exit status: 0 nothing was outside, 1 something was.
+Prints one line with the counts, and on standard error how far it has come.
+
+Exit status: 0 nothing was outside, 1 something was.
 
 Examples
   scripts/envelope_property.py                        1000000 sequences
@@ -42,6 +44,7 @@ DAY_TAI_S = 8.4e8
 RANGES = ((-270.0, 270.0), (0.0, 360.0), (-180.0, 180.0), (-400.0, 400.0), (-100.0, 150.0))
 MOVERS = ("path", "search", "jump", "rest", "garbage", "unfollowed")
 STEP_S = 0.1
+SAY_EVERY = 20000
 ROUNDED_DEG = 0.006  # one 16-bit code
 
 
@@ -55,6 +58,12 @@ class Counts:
     cannot_brake: int = 0
     held: int = 0
     first: str = ""
+
+    def text(self) -> str:
+        return (
+            f"{self.sequences} sequences, {self.steps} writes, {self.held} kept out or held: "
+            f"{self.outside} outside, {self.cannot_brake} that cannot brake outside"
+        )
 
 
 def an_envelope(draw: Random) -> Envelope:
@@ -136,7 +145,7 @@ def a_state(az: AxisState, el: AxisState, antenna: tuple[float, float], *, was_f
 def a_sequence(draw: Random, counts: Counts) -> None:
     """One antenna, two or three movers one after the other."""
     envelope = an_envelope(draw)
-    tai_s = DAY_TAI_S + draw.randrange(86400 * 30) // 60 * 60.0
+    tai_s = DAY_TAI_S + 2160.0 * draw.randrange(40)  # of a day: few, so that the sun is not computed anew each time
     start = a_place(draw, envelope, tai_s)
     if start is None:
         return
@@ -183,6 +192,8 @@ def try_all(count: int, seed: int) -> Counts:
     counts = Counts()
     for number in range(count):
         a_sequence(Random(f"{seed} {number}"), counts)
+        if number % SAY_EVERY == SAY_EVERY - 1:
+            print(counts.text(), file=sys.stderr, flush=True)
     return counts
 
 
@@ -192,10 +203,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
     counts = try_all(given.count, given.seed)
-    print(
-        f"{counts.sequences} sequences, {counts.steps} writes, {counts.held} kept out or held: "
-        f"{counts.outside} outside, {counts.cannot_brake} that cannot brake outside"
-    )
+    print(counts.text())
     if counts.first:
         print(counts.first)
     return 1 if counts.outside or counts.cannot_brake else 0

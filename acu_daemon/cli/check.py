@@ -286,10 +286,12 @@ def _next_pass(name: str, target: Target, now_tai_s: float) -> Iterator[Finding]
         yield Finding(NO_GO, f"{name}: next pass", lacking)
         return
     lasts = open_ends(coming, now_tai_s, now_tai_s + DAY_S) or f"{coming.duration_s / 60:.1f} min"
+    hidden_s = sum(end - begin for begin, end in coming.hidden_tai_s)
+    hidden = f", {hidden_s:.0f} s of it behind the mask" if hidden_s else ""
     yield Finding(
         GO,
         f"{name}: next pass",
-        f"{utc_text(coming.rise_tai_s, 0)}, {lasts}, up to {coming.culmination_el_deg:.1f} deg",
+        f"{utc_text(coming.rise_tai_s, 0)}, {lasts}, up to {coming.culmination_el_deg:.1f} deg{hidden}",
     )
     if not has_spans and (until := ending(target, now_tai_s + NEXT_PASS_DAYS * DAY_S)):
         yield Finding(WARN, f"{name}: decay", until)

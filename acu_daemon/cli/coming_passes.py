@@ -67,7 +67,8 @@ def command(
 ) -> None:
     """Show the passes above the station's lowest elevation: rise, duration, culmination, set.
 
-    Where the limits of an axis do not hold a pass, its line says which axis cannot follow, from when, for how long.
+    Where the limits of an axis do not hold a pass, its line says which axis cannot follow, from when, for how long;
+    where a hill of `[envelope] mask` hides it in its midst, from when and for how long.
 
     Of several element sets of a satellite in its file, each pass is computed from the one nearest to it in time.
 
@@ -188,7 +189,9 @@ def _show(
         )
     )
     for name, one, beyond in rows:
-        notes = [text for text in (open_ends(one, start_tai_s, end_tai_s), *map(_beyond_text, beyond)) if text]
+        hidden = (_hidden_text(*span) for span in one.hidden_tai_s)
+        said = (open_ends(one, start_tai_s, end_tai_s), *hidden, *map(_beyond_text, beyond))
+        notes = [text for text in said if text]
         typer.echo(f"{_as_text(name, one)}  {'; '.join(notes)}".rstrip())
     for name, of in seen.items():
         if of.why_none:
@@ -209,6 +212,10 @@ def _as_text(name: str, one: Pass) -> str:
         culmination_az=f"{one.culmination_az_deg:.1f}",
         set_az=f"{one.set_az_deg:.1f}",
     )
+
+
+def _hidden_text(from_tai_s: float, to_tai_s: float) -> str:
+    return f"behind the mask {to_tai_s - from_tai_s:.0f} s from {utc_text(from_tai_s, 0)[11:19]}"
 
 
 def _beyond_text(one: OutOfReach) -> str:
@@ -243,4 +250,8 @@ def _as_json(name: str, one: Pass, start_tai_s: float, end_tai_s: float) -> dict
         "set_az_deg": round(one.set_az_deg, 3),
         "does_not_rise": one.rise_tai_s == start_tai_s,
         "does_not_set": one.set_tai_s == end_tai_s,
+        "hidden": [
+            {"from_utc": utc_text(begin), "to_utc": utc_text(end), "duration_s": round(end - begin, 3)}
+            for begin, end in one.hidden_tai_s
+        ],
     }

@@ -122,6 +122,7 @@ def fly(
             scenario,
             seed,
             address_byte(acu_section.address),
+            target.station.site.skyline,
         )
         acu = make_acu(parts)
         acu.observer = flight.rows.append

@@ -66,6 +66,7 @@ class PassPlan:
     note: str = ""  # why the turn is not a good one, when no turn holds the whole pass
     beyond: tuple[OutOfReach, ...] = ()  # when which axis cannot follow
     learned_count: int = 0  # turns of the azimuth that were learned before it was made
+    hidden_tai_s: tuple[tuple[float, float], ...] = ()  # when it is behind the skyline, by its elements
 
 
 @dataclass(frozen=True, slots=True)

@@ -90,6 +90,8 @@ class Snapshot:
     rise_in_s: float | None = None  # negative: the pass has begun
     set_in_s: float | None = None
     culmination_deg: float | None = None
+    is_hidden: bool = False  # the path is behind the mask, and nothing is heard
+    hidden_s: float | None = None  # until it comes out again, while it is
 
 
 def snapshot_of(values: Mapping[str, Any]) -> Snapshot:

@@ -5,6 +5,7 @@ from math import isfinite
 
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState
+from acu_daemon.control.tracking.hills import hidden_until_tai_s, is_hidden
 from acu_daemon.control.tracking.off_path import off_path
 from acu_daemon.control.tracking.scan import covered_text
 from acu_daemon.control.tracking.state_table import AUTOTRACKING, TrackState
@@ -55,6 +56,9 @@ def take_snapshot(
         set_in_s=coming.set_tai_s + late_s - now_tai_s if coming else None,
         culmination_deg=coming.culmination_el_deg if coming else None,
     )
+    if not seen.is_acquired and is_hidden(area.sky, now_tai_s, control):
+        until_tai_s = hidden_until_tai_s(area.sky, now_tai_s)
+        seen = replace(seen, is_hidden=True, hidden_s=None if until_tai_s is None else until_tai_s - now_tai_s)
     return replace(seen, verdict=verdict(seen).word)
 
 

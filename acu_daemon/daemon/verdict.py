@@ -116,6 +116,9 @@ def _blind(seen: Snapshot, state: TrackState) -> Verdict:
     is_up = seen.rise_in_s is None or seen.rise_in_s <= 0.0
     if seen.is_on_path is not True and (is_up or state in HOLDING):
         return Verdict("OFF PATH", Level.BAD, f"no signal, and the antenna is half a beam or more off {path}")
+    if seen.is_hidden and is_up:
+        back = f", back in {seen.hidden_s:.0f} s" if seen.hidden_s is not None else ""
+        return Verdict("HIDDEN", Level.CALM, f"behind the mask{back}; the antenna is led along {path}")
     if state is S.ACQUIRE_TLE:
         level = Level.WATCH if is_up else Level.CALM
         return Verdict("NO SIGNAL YET", level, f"the antenna points along {path}")

@@ -1,12 +1,13 @@
 """Passes of a satellite over a site: rise, culmination and set, none missed, grazing ones included."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import ceil, log, log2, pi
 
 import numpy as np
 import numpy.typing as npt
 
-from acu_daemon.model import Pass, Site
+from acu_daemon.model import Horizon, Pass, Site
 from acu_daemon.orbit.kepler import osculating_from_state
 from acu_daemon.orbit.look import apparent_at
 from acu_daemon.orbit.propagator import Propagator, spans_tai_s
@@ -16,6 +17,7 @@ _STEPS_PER_REVOLUTION = 60.0
 _FINEST_SHARE = 0.02  # of that step, however eccentric the orbit
 _GOLDEN = (5.0**0.5 - 1.0) / 2.0
 _RESOLUTION_S = 1e-3
+SKYLINE_STEP_S, MOST_SKYLINE_STEPS = 1.0, 20000
 _REVOLUTIONS_BEYOND = 3.0
 
 _Height = Callable[[Array], Array]  # times (N,) to degrees above the lowest elevation (N,)
@@ -26,7 +28,9 @@ def find_passes(
 ) -> list[Pass]:
     """Find every pass that touches the span, in order; rise and set to 1 ms, on the inner side of the crossing.
 
-    Elevations are apparent: those in the air of the site's antenna, if it has any.
+    Elevations are apparent: those in the air of the site's antenna, if it has any.  Where the site has a skyline, a
+    pass begins and ends by it too, and holds the times in between at which it is behind it; a pass that never comes
+    over it is none.
 
     A pass in progress at the start (end) has its true rise (set), looked for up to three revolutions outside the
     span.  A satellite that does not rise (set) within those has a pass that begins at the start (ends at the end) of
@@ -45,7 +49,33 @@ def find_passes(
         start, end = max(start_tai_s, first_tai_s), min(end_tai_s, last_tai_s)
         if start <= end:
             found += _within(propagator, site, start, end, min_elevation_deg, first_tai_s, last_tai_s)
-    return found
+    if site.skyline is None:
+        return found
+    seen = (_over_skyline(propagator, site, site.skyline, one) for one in found)
+    return [one for one in seen if one is not None and one.set_tai_s >= start_tai_s and one.rise_tai_s <= end_tai_s]
+
+
+def _over_skyline(propagator: Propagator, site: Site, skyline: Horizon, one: Pass) -> Pass | None:
+    """What the skyline leaves of a pass; hills that are crossed within SKYLINE_STEP_S are not seen."""
+
+    def height(tai_s: Array) -> Array:
+        seen = apparent_at(propagator, tai_s, site)
+        return seen.el_deg - skyline.heights_deg(seen.az_deg)
+
+    count = max(2, ceil(min(one.duration_s / SKYLINE_STEP_S, MOST_SKYLINE_STEPS)) + 1)
+    nodes = np.linspace(one.rise_tai_s, one.set_tai_s, count)
+    is_free = height(nodes) >= 0.0
+    if not is_free.any():
+        return None
+    step_s = float(nodes[1] - nodes[0])
+    comes = _crossings(height, nodes, ~is_free[:-1] & is_free[1:], step_s, is_rising=True).tolist()
+    goes = _crossings(height, nodes, is_free[:-1] & ~is_free[1:], step_s, is_rising=False).tolist()
+    rise_tai_s = one.rise_tai_s if is_free[0] else comes.pop(0)
+    set_tai_s = one.set_tai_s if is_free[-1] else goes.pop()
+    inner = np.array([one.culmination_tai_s] if rise_tai_s < one.culmination_tai_s < set_tai_s else [])
+    return replace(
+        _pass(propagator, site, rise_tai_s, set_tai_s, inner), hidden_tai_s=tuple(zip(goes, comes, strict=True))
+    )
 
 
 def _within(

@@ -1,5 +1,6 @@
 """Why a satellite has no pass over a site: one that can never come up, or one that hardly moves in the sky."""
 
+from dataclasses import replace
 from math import acos, cos, radians
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from acu_daemon.model import Site
 from acu_daemon.orbit.kepler import osculating_from_state
 from acu_daemon.orbit.look import look_at
+from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import DAY_S, DEG, EARTH_EQUATORIAL_RADIUS_M, MU_M3_S2
 
@@ -20,6 +22,10 @@ def why_none(propagator: Propagator, site: Site, start_tai_s: float, end_tai_s: 
 
     Raises:  OrbitError: the propagator has no answer for the span.
     """
+    if site.skyline is not None and (
+        hidden := find_passes(propagator, replace(site, skyline=None), start_tai_s, end_tai_s, min_elevation_deg)
+    ):
+        return f"all of its passes above {min_elevation_deg:g} deg are behind the mask, {len(hidden)} of them"
     orbit = osculating_from_state(*propagator.states_teme(np.array([start_tai_s])))
     a_m, e, i_rad = float(orbit.a_m[0]), float(orbit.e[0]), float(orbit.i_rad[0])
     low = radians(min_elevation_deg)

@@ -10,6 +10,8 @@ from enum import Enum, auto
 from math import cos, radians
 from random import Random
 
+import numpy as np
+
 from acu_daemon.drivers.sa3842.angles import elevation_code, elevation_deg
 from acu_daemon.model import AxisLimits
 from acu_daemon.sim.autotrack import Autotrack
@@ -85,6 +87,7 @@ class SimulatedAntenna:
         self._encoder_random = Random(f"{parts.seed} encoder")
         self._sector_bit = scenario.acu.sector_bit
         self._sector_random = Random(f"{parts.seed} sector")
+        self._skyline = parts.skyline
         self._losses = [(*loss.window_tai_s(parts.start_tai_s), loss) for loss in scenario.losses]
         self._autotrack = Autotrack(self.az, self.el)
         self._follow_az, self._follow_el = Follower(parts.azimuth), Follower(parts.elevation)
@@ -157,6 +160,8 @@ class SimulatedAntenna:
         self.direction, self.offset = self._sky.direction(tai_s), None
         if self.direction is not None:
             self.offset = offset_in_beam(self.direction[0], self.direction[1], *self.boresight_deg)
+            if self._skyline is not None:
+                is_silent |= self.direction[1] < float(self._skyline.heights_deg(np.array(self.direction[0])))
         heard = None if is_silent else self.offset
         if self.trouble.carrier_deg is not None:
             heard = offset_in_beam(*self.trouble.carrier_deg, *self.boresight_deg)

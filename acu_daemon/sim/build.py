@@ -67,4 +67,4 @@ def build_fake_acu(
     """Build a fake ACU.  UsageError: the scenario or the truth file cannot be used."""
     chosen = Scenario() if scenario is None else read_scenario(scenario)
     sky = make_sky(propagator, site, chosen, truth, station_air=station_air, seed=seed)
-    return FakeAcu(AcuParts(azimuth, elevation, beamwidth_deg, sky, start_tai_s, chosen, seed, address))
+    return FakeAcu(AcuParts(azimuth, elevation, beamwidth_deg, sky, start_tai_s, chosen, seed, address, site.skyline))

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from acu_daemon.drivers.sa3842.codec import DEFAULT_ADDRESS
-from acu_daemon.model import AxisLimits
+from acu_daemon.model import AxisLimits, Horizon
 from acu_daemon.sim.scenario import Scenario
 from acu_daemon.sim.sky import SimulatedSky
 
@@ -20,3 +20,4 @@ class AcuParts:
     scenario: Scenario = Scenario()
     seed: int = 0
     address: int = DEFAULT_ADDRESS
+    skyline: Horizon | None = None  # behind which nothing is heard

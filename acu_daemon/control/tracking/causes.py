@@ -7,6 +7,7 @@ from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState, StartStage
 from acu_daemon.control.tick_input import Sky, TickInput
 from acu_daemon.control.tracking.approach import ACQUIRE_LEAD_S, lead_s
+from acu_daemon.control.tracking.hills import came_out_tai_s, is_hidden
 from acu_daemon.control.tracking.pass_plan import pass_end_tai_s
 from acu_daemon.control.tracking.register_limiter import within_limits
 from acu_daemon.control.tracking.state_table import HOLDING, Cause, TrackState
@@ -78,6 +79,8 @@ def _of_signal(state: ControlState, status: Status, given: TickInput, config: Co
             causes.add(Cause.ACQUIRED)
     else:
         causes.add(Cause.LOST)
+        if is_hidden(sky, given.now_tai_s, config):
+            causes |= {Cause.HIDDEN, Cause.HIDDEN_FITTED} if sky.is_fitted else {Cause.HIDDEN}
     return causes
 
 
@@ -168,8 +171,8 @@ def _of_time(state: ControlState, status: Status, given: TickInput, config: Cont
     if is_left and in_state_s > MODE_SETTLE_S:
         causes.add(Cause.MODE_LEFT)
     if track is TrackState.ACQUIRE_TLE and sky.plan is not None:
-        waiting_s = now_tai_s - max(state.tracking.entered_tai_s, sky.plan.rise_tai_s)
-        if waiting_s > config.acquire_s:
+        waiting_s = now_tai_s - max(state.tracking.entered_tai_s, came_out_tai_s(sky, now_tai_s))
+        if waiting_s > config.acquire_s and not is_hidden(sky, now_tai_s, config):
             causes.add(Cause.ACQUIRE_OVER)
     is_glimpse = track is TrackState.HOLD_TLE and not state.signal.has_locked  # nothing worth a long hold
     hold_s = min(config.hold_s, config.acquire_s) if is_glimpse else config.hold_s

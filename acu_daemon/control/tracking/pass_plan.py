@@ -50,6 +50,7 @@ def plan_pass(
         note="" if turn.holds_path else turn.reason,
         beyond=out_of_reach(tai_s, az_deg + turn.offset_deg, look.el_deg, azimuth, elevation),
         learned_count=learned_count,
+        hidden_tai_s=coming.hidden_tai_s,
     )
 
 

@@ -97,7 +97,8 @@ def may_look(point: Pointing | None, config: ControlConfig) -> bool:
         return False
     lowest_deg = max(config.elevation.min_deg, config.min_elevation_deg)
     is_high_enough = lowest_deg <= point.el_deg <= config.elevation.max_deg
-    return is_high_enough and nearest_turn(point.az_deg, 0.0, config.azimuth) is not None
+    is_seen = config.envelope.over_skyline_deg(point.az_deg, point.el_deg) >= 0.0
+    return is_high_enough and is_seen and nearest_turn(point.az_deg, 0.0, config.azimuth) is not None
 
 
 def go_on(

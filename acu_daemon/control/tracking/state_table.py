@@ -50,6 +50,8 @@ class Cause(StrEnum):
     FIT = "a fit was accepted"
     FIT_LEFT = "newer readings deny the fit: the prediction is made from the elements again"
     LOST = "the signal is lost"
+    HIDDEN = "the satellite is behind the mask"
+    HIDDEN_FITTED = "the satellite is behind the mask, and a fit of this pass exists"
     MODE_LEFT = "the ACU left the mode by itself (power cycle, or another hand)"
     ACQUIRE_OVER = "no signal within acquire_s"
     HOLD_OVER = "no signal within hold_s"
@@ -107,6 +109,10 @@ TABLE: tuple[Row, ...] = (
     Row(frozenset({S.HOLD_FITTED}), Cause.FIT_LEFT, S.HOLD_TLE),
     Row(frozenset({S.ACQUIRE_TLE, S.SEARCH}), Cause.ACQUIRED_FITTED, S.AUTOTRACK_FITTED),
     Row(frozenset({S.ACQUIRE_TLE, S.SEARCH, S.HOLD_TLE}), Cause.ACQUIRED, S.AUTOTRACK_TLE),
+    Row(frozenset({S.SEARCH}), Cause.HIDDEN_FITTED, S.HOLD_FITTED),
+    Row(frozenset({S.SEARCH}), Cause.HIDDEN, S.HOLD_TLE),
+    Row(frozenset({S.AUTOTRACK_FITTED}), Cause.HIDDEN, S.HOLD_FITTED),
+    Row(frozenset({S.AUTOTRACK_TLE}), Cause.HIDDEN, S.HOLD_TLE),
     Row(frozenset({S.ACQUIRE_TLE}), Cause.ACQUIRE_OVER, S.SEARCH, "acquire_s after the rise"),
     Row(frozenset({S.AUTOTRACK_FITTED}), Cause.LOST, S.HOLD_FITTED),
     Row(frozenset({S.AUTOTRACK_TLE}), Cause.LOST, S.HOLD_TLE),

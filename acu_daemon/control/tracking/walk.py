@@ -15,9 +15,11 @@ from acu_daemon.control.startup import begin_after_lost_link
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick_input import Sky, TickInput
 from acu_daemon.control.tracking.causes import find_causes
+from acu_daemon.control.tracking.hills import hidden_until_tai_s, is_hidden
 from acu_daemon.control.tracking.late_arrival import lateness
-from acu_daemon.control.tracking.state_table import HOLDING, TrackState, transition
+from acu_daemon.control.tracking.state_table import HOLDING, Cause, TrackState, transition
 
+HIDDEN = (Cause.HIDDEN, Cause.HIDDEN_FITTED)
 ALARMS = (TrackState.LINK_LOST, TrackState.FAULT, TrackState.SEARCH)
 
 
@@ -25,13 +27,15 @@ def walk(state: ControlState, given: TickInput, config: ControlConfig, events: l
     """Go to the next state, where a cause of it is present."""
     causes = find_causes(state, given, config)
     tracking, now_tai_s = state.tracking, given.now_tai_s
-    if tracking.track in HOLDING and _is_sure(given.sky, now_tai_s, config):
+    if tracking.track in HOLDING and _keeps_holding(given.sky, now_tai_s, config):
         tracking = replace(tracking, hold_from_tai_s=now_tai_s)
     step = transition(tracking.track, causes)
     if step is None:
         return state if tracking is state.tracking else replace(state, tracking=tracking)
     before, (track, cause) = tracking.track, step
-    fields = {"state": str(track), "before": str(before), "cause": str(cause)}
+    fields: dict[str, object] = {"state": str(track), "before": str(before), "cause": str(cause)}
+    if cause in HIDDEN and (until_tai_s := hidden_until_tai_s(given.sky, now_tai_s)) is not None:
+        fields["back_in_s"] = round(until_tai_s - now_tai_s, 1)
     events.append(Event("state.changed", fields, is_warning=track in ALARMS))
     if track is TrackState.PREPOSITION:
         events += lateness(state, given.sky, now_tai_s, config)
@@ -44,7 +48,12 @@ def walk(state: ControlState, given: TickInput, config: ControlConfig, events: l
     return state
 
 
-def _is_sure(sky: Sky, now_tai_s: float, config: ControlConfig) -> bool:
-    """Whether 3 sigma of the prediction still lie within half the beam (only for estimators that know a sigma)."""
+def _keeps_holding(sky: Sky, now_tai_s: float, config: ControlConfig) -> bool:
+    """Whether a hold need not end: behind the mask, or 3 sigma of the prediction still lie within half the beam.
+
+    The latter only for estimators that know a sigma.
+    """
+    if is_hidden(sky, now_tai_s, config):
+        return True
     inside_s = sky.prediction.seconds_inside(now_tai_s, config.beamwidth_deg / 2) if sky.prediction else None
     return inside_s is not None and inside_s > 0.0
