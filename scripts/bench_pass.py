@@ -32,6 +32,7 @@ from real_pass import pass_names
 from tables.outputs import output_file
 
 from acu_daemon.cli.options import load_target
+from acu_daemon.drivers.sa3842.angles import LSB_DEG
 from acu_daemon.errors import AcuDaemonError
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.report.pass_trace import read_trace
@@ -67,7 +68,7 @@ def measure(rig: Rig) -> Result:
     trace = read_trace(rig.trace)
     counts = {name: done[0][name] for name in Result.__dataclass_fields__ if name in done[0]}
     try:
-        writes = measure_writes(read_writes(rig.wire_log), trace, *limits)
+        writes = measure_writes(read_writes(rig.wire_log), trace, *limits, LSB_DEG)
         return Result(rig.daemon.returncode, writes, measure_losses(trace, *limits), **counts)
     except ValueError as error:
         raise BenchError(f"{rig.link}: {error}") from None

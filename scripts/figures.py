@@ -28,21 +28,14 @@ from tables.console import progress
 from tables.outputs import output_file
 from tables.workers import run_script
 
+from acu_daemon.acu.commands import AcuMode, Backup, Poll, SelectBackup, SelectMode
 from acu_daemon.assist.estimators.estimator import EstimatorSettings, make_estimator
 from acu_daemon.assist.estimators.inversion import KnownElements, direction_cosines, invert
 from acu_daemon.assist.session.prediction import predict
 from acu_daemon.cli import demo
 from acu_daemon.cli.options import Target, load_target
 from acu_daemon.cli.virtual_pass import Flight, fly
-from acu_daemon.drivers.sa3842.messages import (
-    AcuMode,
-    Backup,
-    Poll,
-    SelectBackup,
-    SelectMode,
-    WriteAndPoll,
-    WriteParameter,
-)
+from acu_daemon.drivers.sa3842.messages import WriteAndPoll, WriteParameter
 from acu_daemon.edge.campaign import results_of, run_campaign
 from acu_daemon.model import (
     AxisLimits,

@@ -16,10 +16,11 @@ import numpy as np
 import structlog
 
 with atheris.instrument_imports(include=["acu_daemon"]):
+    from acu_daemon.acu.commands import AcuMode, Identify, Poll
     from acu_daemon.config.load import load_satellite, load_station
     from acu_daemon.drivers.sa3842.codec import CommandDecoder, ReplyDecoder, encode_command, encode_reply
     from acu_daemon.drivers.sa3842.exchange import HostExchange
-    from acu_daemon.drivers.sa3842.messages import AcuMode, Identify, Poll, Status
+    from acu_daemon.drivers.sa3842.messages import Status
     from acu_daemon.edge.carry_over_file import read_carry_over
     from acu_daemon.edge.elements_file import load_elements
     from acu_daemon.edge.recording import read_readings

@@ -8,16 +8,10 @@ from typing import Any
 import numpy as np
 
 import acu_daemon.cli as cli
+from acu_daemon.acu.commands import SelectBackup, SelectMode
 from acu_daemon.cli.options import Target, coming_pass, load_target
 from acu_daemon.cli.virtual_pass import Flight, ScriptAccess, fly
-from acu_daemon.drivers.sa3842.messages import (
-    Command,
-    SelectBackup,
-    SelectMode,
-    WriteAndPoll,
-    WriteParameter,
-    WriteRegisters,
-)
+from acu_daemon.drivers.sa3842.messages import Command, WriteAndPoll, WriteParameter, WriteRegisters
 from acu_daemon.model import Pass, sky_angle_deg
 from acu_daemon.orbit.brouwer import BrouwerPropagator
 from acu_daemon.orbit.timescales import gmst_rad, tai_from_utc

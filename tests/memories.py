@@ -3,9 +3,9 @@
 from dataclasses import fields, replace
 from typing import Any
 
+from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.control.safety.status_plausibility import Plausibility, judge
 from acu_daemon.control.state import ControlState
-from acu_daemon.drivers.sa3842.messages import Status
 from acu_daemon.model import AxisLimits
 
 PART_OF = {
@@ -33,6 +33,6 @@ class Judge:
         self._limits = azimuth, elevation
         self.known = Plausibility()
 
-    def believes(self, status: Status, tai_s: float) -> bool:
-        self.known = judge(self.known, status, tai_s, *self._limits)
+    def believes(self, status: AcuStatus, tai_s: float) -> bool:
+        self.known = judge(self.known, status, tai_s, *self._limits, within_s=0.5)
         return self.known.is_believed

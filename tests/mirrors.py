@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from acu_daemon.acu.commands import PointAndPoll, PointAt
+from acu_daemon.acu.replies import AcuStatus, Commanded
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Sky
-from acu_daemon.drivers.sa3842.messages import RegisterContents, Status, WriteAndPoll, WriteRegisters
 from acu_daemon.model import AxisLimits, FitResult, Prediction, Reading
 from acu_daemon.pointing.envelope import Envelope
 
@@ -40,7 +41,7 @@ class Mirror:
             ),
         )
 
-    def status(self, status: Status) -> Status:
+    def status(self, status: AcuStatus) -> AcuStatus:
         ends = {"is_at_cw_limit": status.is_at_cw_limit, "is_at_ccw_limit": status.is_at_ccw_limit}
         if self.az < 0:
             ends = {"is_at_cw_limit": status.is_at_ccw_limit, "is_at_ccw_limit": status.is_at_cw_limit}
@@ -55,9 +56,9 @@ class Mirror:
 
     def message(self, message: Any) -> Any:
         """A command, or a reply."""
-        if isinstance(message, WriteAndPoll | WriteRegisters):
+        if isinstance(message, PointAndPoll | PointAt):
             return replace(message, az_deg=self.az_deg(message.az_deg), el_deg=self.el * message.el_deg)
-        if isinstance(message, RegisterContents):
+        if isinstance(message, Commanded):
             return replace(message, az_deg=self.az_deg(message.az_deg) % 360.0, el_deg=self.el * message.el_deg)
         return message
 

@@ -6,14 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 from flights import LSB_DEG
 
+from acu_daemon.acu.commands import Poll, SelectBackup, SelectMode
 from acu_daemon.daemon.service import FIRST_POLL_S, Outcome
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.drivers.sa3842.messages import (
     Command,
-    Poll,
     ReadRegisters,
-    SelectBackup,
-    SelectMode,
     Status,
     WriteAndPoll,
     WriteParameter,

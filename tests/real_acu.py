@@ -5,15 +5,13 @@ import socket
 import threading
 from collections.abc import Iterator
 
+from acu_daemon.acu.commands import AcuMode, Identify, Poll
 from acu_daemon.drivers.sa3842.codec import CommandDecoder, encode_reply
 from acu_daemon.drivers.sa3842.messages import (
     Ack,
-    AcuMode,
     Command,
-    Identify,
     Identity,
     Parameter,
-    Poll,
     ReadParameter,
     ReadRegisters,
     RegisterContents,

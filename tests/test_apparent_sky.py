@@ -9,9 +9,9 @@ from conftest import DATA, needs_data
 from fake_sky import START_TAI_S, Bench, Star
 from flights import demo_target, sky_of
 
+from acu_daemon.acu.commands import AcuMode, SelectMode
 from acu_daemon.cli.simulated import station_air
 from acu_daemon.config.antenna_tables import AtmosphereSection
-from acu_daemon.drivers.sa3842.messages import AcuMode, SelectMode
 from acu_daemon.model import sky_angle_deg
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 from acu_daemon.pointing.air import Air

@@ -8,13 +8,13 @@ from hypothesis import strategies as st
 from memories import remembering
 from test_tick import AZ_DEG, CONFIG, NOW, SKY, ready, status
 
+from acu_daemon.acu.commands import AcuMode
 from acu_daemon.cli.options import Target, not_covered
 from acu_daemon.cli.virtual_pass import Flight
 from acu_daemon.control.tracking.approach import longest_lead_s, way_s
 from acu_daemon.control.tracking.late_arrival import lateness
 from acu_daemon.control.tracking.register_limiter import CHASE_ACCELERATION_MARGIN, CHASE_RATE_MARGIN
 from acu_daemon.control.tracking.state_table import TrackState
-from acu_daemon.drivers.sa3842.messages import AcuMode
 from acu_daemon.model import AxisLimits
 from acu_daemon.orbit.look import look_at
 from acu_daemon.pointing.axis import AxisState, step

@@ -17,24 +17,21 @@ from flights import (
     worst_error_deg,
 )
 
+from acu_daemon.acu.commands import READS, AcuMode, Backup, SelectBackup, SelectMode, Stop
 from acu_daemon.cli.virtual_pass import Flight, ScriptAccess
-from acu_daemon.control.safety.command_permit import READS
 from acu_daemon.drivers.sa3842.messages import (
-    AcuMode,
-    Backup,
     Command,
     Nak,
     Parameter,
     ReadParameter,
+    ReadRegisters,
     Reply,
-    SelectBackup,
-    SelectMode,
-    Stop,
     WriteParameter,
     WriteRegisters,
 )
 from acu_daemon.sim.acu import FakeAcu
 
+QUESTIONS = (*READS, ReadRegisters, ReadParameter)  # on the wire
 T = RISING_TAI_S
 FAULT_S, LOST_S, END_S = 15.0, 12.0, 30.0
 HOLD_DEG = 0.1
@@ -77,7 +74,7 @@ def test_p6_a_failing_axis_is_stopped_and_latched_and_nothing_moves_it_any_more(
     assert event["problem"] == LATCHES[fault] == flight.snapshots[-1].latch
     latched_tai_s = next(seen.tai_s for seen in flight.snapshots if seen.latch)
     sent = commands_between(flight, latched_tai_s - TICK_PART_S, T + END_S - 0.2)
-    assert [command for command in sent if not isinstance(command, READS)] == [Stop()]
+    assert [command for command in sent if not isinstance(command, QUESTIONS)] == [Stop()]
     assert state_at(flight, T + END_S) == "FAULT"
 
 
@@ -129,7 +126,7 @@ def test_a_frozen_encoder_in_autotrack_is_an_alarm_its_readings_are_not_fitted_a
 
 def test_p1_with_manual_arming_nothing_is_written_until_a_person_arms() -> None:
     flight = climb(20.0, demo_target(safety={"arm": "manual"}), script=[(8.0, says("arm"))])
-    assert all(isinstance(command, READS) for command in commands_between(flight, T, T + 8.0))
+    assert all(isinstance(command, QUESTIONS) for command in commands_between(flight, T, T + 8.0))
     assert {row.encoder_az_deg for row in flight.rows if row.tai_s < T + 8.0} == {RISING_ANTENNA.azimuth_deg}
     first = next(command for _, command in flight.commands if isinstance(command, ORDERS))
     assert isinstance(first, WriteRegisters)
@@ -138,7 +135,7 @@ def test_p1_with_manual_arming_nothing_is_written_until_a_person_arms() -> None:
 
 def test_p1_disarmed_in_mid_pass_the_antenna_stands_and_armed_again_it_goes_back_to_the_fit() -> None:
     flight = climb(40.0, losses=[(LOST_S, 38.0)], script=[(15.0, says("disarm")), (25.0, says("arm"))])
-    sent = [command for command in commands_between(flight, T + 15.005, T + 25.0) if not isinstance(command, READS)]
+    sent = [command for command in commands_between(flight, T + 15.005, T + 25.0) if not isinstance(command, QUESTIONS)]
     assert sent == [Stop(), WriteParameter("W", 0)]
     assert flight.states()[-3:] == ["IDLE", "HOLD/FITTED", "AUTOTRACK/FITTED"]
     assert worst_error_deg(flight, T + 30.0, T + 38.0) < HOLD_DEG
@@ -146,7 +143,9 @@ def test_p1_disarmed_in_mid_pass_the_antenna_stands_and_armed_again_it_goes_back
 
 def test_p1_disarmed_it_ends_without_another_stop() -> None:
     flight = climb(20.0, script=[(12.0, says("disarm"))])
-    assert [command for command in commands_between(flight, T + 14.0, T + 21.0) if not isinstance(command, READS)] == []
+    assert [
+        command for command in commands_between(flight, T + 14.0, T + 21.0) if not isinstance(command, QUESTIONS)
+    ] == []
 
 
 def test_a_stop_by_another_hand_in_mid_pass_is_respected_until_a_person_arms() -> None:
@@ -171,7 +170,7 @@ def shadow() -> Flight:
 
 
 def test_p1_a_shadow_sends_nothing_but_questions(shadow: Flight) -> None:
-    assert all(isinstance(command, READS) for _, command in shadow.commands)
+    assert all(isinstance(command, QUESTIONS) for _, command in shadow.commands)
     assert shadow.outcome is not None
     assert (shadow.outcome.write_count, shadow.outcome.is_stopped) == (0, True)
 

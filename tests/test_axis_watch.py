@@ -6,6 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from acu_daemon.acu.commands import AcuMode, Backup
+from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.control.safety.axis_watch import (
     AWAY_S,
     AxisSeen,
@@ -17,7 +19,6 @@ from acu_daemon.control.safety.axis_watch import (
     watch_axis,
 )
 from acu_daemon.control.safety.encoder_watch import FROZEN_DEG, EncoderWatch, watch_encoders
-from acu_daemon.drivers.sa3842.messages import AcuMode, Backup, Status
 from acu_daemon.model import AxisLimits, Pointing
 from acu_daemon.pointing.axis import AxisState, step
 
@@ -261,7 +262,7 @@ def test_a_pause_in_the_readings_begins_everything_anew() -> None:
     ],
 )
 def test_what_a_mode_asks_of_the_axes(mode, backup, duty) -> None:
-    assert duty_of(Status(10.0, 20.0, mode, backup_selected=backup)) is duty
+    assert duty_of(AcuStatus(10.0, 20.0, mode, backup_selected=backup)) is duty
 
 
 # Encoders in autotrack
@@ -270,7 +271,7 @@ def test_what_a_mode_asks_of_the_axes(mode, backup, duty) -> None:
 def encoders(readings, rate_deg_s: float) -> EncoderWatch:
     watch = EncoderWatch()
     for k, el_deg in enumerate(readings):
-        status = Status(100.0 + 0.01 * k, el_deg, AcuMode.AUTOTRACK)
+        status = AcuStatus(100.0 + 0.01 * k, el_deg, AcuMode.AUTOTRACK)
         watch = watch_encoders(watch, TICK_S * k, status, Pointing(100.0, 40.0, 0.1, rate_deg_s))
     return watch
 

@@ -15,20 +15,10 @@ from command_line import Done, acu_daemon
 from config_files import BROUWER, STATION, from_file, replaced, write
 from test_live_line import SEEN
 
+from acu_daemon.acu.commands import AcuMode, Identify, Poll, ReadFaults
 from acu_daemon.cli import check, own_daemon
 from acu_daemon.drivers.sa3842.codec import CMD_OF, CommandDecoder, encode_reply
-from acu_daemon.drivers.sa3842.messages import (
-    AcuMode,
-    Command,
-    Faults,
-    Identify,
-    Identity,
-    Nak,
-    Poll,
-    ReadFaults,
-    Reply,
-    Status,
-)
+from acu_daemon.drivers.sa3842.messages import Command, Faults, Identity, Nak, Reply, Status
 from acu_daemon.drivers.sa3842.status_block import decode_status
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.control_socket import SOCKET

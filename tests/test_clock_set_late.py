@@ -9,9 +9,9 @@ from flights import DEMO_TAI_S
 from waiting import Story, tell
 
 import acu_daemon.cli as cli
+from acu_daemon.acu.commands import Stop
 from acu_daemon.cli.clock_wait import wait_for_clock
 from acu_daemon.cli.options import coming_pass, load_target
-from acu_daemon.drivers.sa3842.messages import Stop
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.clock_sense import before_elements, before_release
 from acu_daemon.errors import UsageError

@@ -6,7 +6,7 @@ import pytest
 from flights import RISING_TAI_S, climb, demo_target, events_named
 from test_tick import NOW, path
 
-from acu_daemon.config.to_settings import control_config
+from acu_daemon.config.to_settings import control_config, driver_of
 from acu_daemon.daemon.clock_watch import ClockWatch
 from acu_daemon.daemon.live import live_text
 from acu_daemon.edge.clock import LoopClock
@@ -61,7 +61,9 @@ def test_p7_a_clock_that_is_off_by_the_set_share_of_the_beam_at_the_present_rate
 
 def test_p7_the_share_and_the_beam_come_from_the_configuration() -> None:
     target = demo_target(safety={"clock_alarm_beam_fraction": 0.2}, receiver={"beamwidth_deg": 0.5})
-    assert control_config(target.station, target.satellite, 0.0).clock_alarm_deg == pytest.approx(0.1)
+    assert control_config(
+        target.station, target.satellite, driver_of(target.station), 0.0
+    ).clock_alarm_deg == pytest.approx(0.1)
 
 
 class Stepped(LoopClock):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from acu_daemon.config.load import load_satellite, load_station, satellite_names
 from acu_daemon.config.problems import in_words
-from acu_daemon.config.to_settings import control_config, estimator_settings
+from acu_daemon.config.to_settings import control_config, driver_of, estimator_settings
 from acu_daemon.errors import ConfigError
 from acu_daemon.orbit.timescales import tai_from_utc
 
@@ -334,10 +334,10 @@ def test_an_error_without_words_of_ours_keeps_the_checkers_own() -> None:
 def test_the_delays_of_a_tick_follow_the_arithmetic_of_the_icd(tmp_path: Path) -> None:
     write(tmp_path)
     satellite, station = load_satellite(tmp_path, "scd", load_station(tmp_path))
-    over_tcp = control_config(station, satellite, 0.0)
+    over_tcp = control_config(station, satellite, driver_of(station), 0.0)
     assert (over_tcp.sample_delay_s, over_tcp.poll_sample_delay_s) == (0.010, 0.010)
     assert over_tcp.effect_delay_s == pytest.approx(0.020)
-    serial = control_config(station, satellite, BYTE_9600_S)
+    serial = control_config(station, satellite, driver_of(station), BYTE_9600_S)
     assert serial.sample_delay_s == pytest.approx(17 * BYTE_9600_S + 0.010)
     assert serial.poll_sample_delay_s == pytest.approx(5 * BYTE_9600_S + 0.010)
     assert serial.effect_delay_s - serial.sample_delay_s == pytest.approx(0.010)
@@ -347,7 +347,7 @@ def test_the_rooms_get_what_the_files_say(tmp_path: Path) -> None:
     more = '[safety]\narm = "manual"\n[tracking]\nmax_fit_elevation_deg = 70\n[readings]\nsigma_azimuth_deg = 0.02\n'
     write(tmp_path, STATION + more, scd=f"{BROUWER}[fallback]\nhold_s = 7\nsearch_s = 8\nacquire_s = 9\n")
     satellite, station = load_satellite(tmp_path, "scd", load_station(tmp_path))
-    control = control_config(station, satellite, 0.0)
+    control = control_config(station, satellite, driver_of(station), 0.0)
     assert not control.is_armed
     assert (control.hold_s, control.search_s, control.acquire_s) == (7, 8, 9)
     assert (control.azimuth.min_deg, control.elevation.max_rate_deg_s) == (-270.0, 5.0)
@@ -366,7 +366,7 @@ def test_the_envelope_gets_what_the_files_say(tmp_path: Path) -> None:
     )
     write(tmp_path, STATION + more, scd=BROUWER)
     satellite, station = load_satellite(tmp_path, "scd", load_station(tmp_path))
-    envelope = control_config(station, satellite, 0.0).envelope
+    envelope = control_config(station, satellite, driver_of(station), 0.0).envelope
     assert envelope.skyline == station.site.skyline
     assert envelope.skyline is not None
     assert envelope.skyline.height_deg(45.0) == pytest.approx(8.75)

@@ -28,24 +28,19 @@ from flights import (
     worst_error_deg,
 )
 
+from acu_daemon.acu.commands import AcuMode, Identify, Poll, ReadFaults, SelectMode, Stop
 from acu_daemon.assist.session.refit import RefitReply, RefitRequest, RefitSetup, predict_from
 from acu_daemon.cli.virtual_pass import Flight, ScriptAccess
 from acu_daemon.config.tracking_tables import LEAST_LOW_WATER_S
 from acu_daemon.daemon.background import RETRY_S, fit_deadline_s
 from acu_daemon.daemon.live import live_text
 from acu_daemon.drivers.sa3842.messages import (
-    AcuMode,
     Command,
-    Identify,
     Identity,
     Nak,
-    Poll,
-    ReadFaults,
     ReadRegisters,
     Reply,
     ResetFault,
-    SelectMode,
-    Stop,
     Stow,
     WriteAndPoll,
     WriteParameter,

@@ -10,8 +10,8 @@ from flights import DEMO_TAI_S
 from waiting import Story, tell
 
 import acu_daemon.cli as cli
+from acu_daemon.acu.commands import Stop
 from acu_daemon.cli.options import coming_pass, load_target
-from acu_daemon.drivers.sa3842.messages import Stop
 from acu_daemon.orbit.timescales import tai_from_utc
 
 DEMO = Path(cli.__file__).parent / "demo_config"

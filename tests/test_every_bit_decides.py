@@ -7,16 +7,22 @@ import pytest
 from memories import remembering
 from test_tick import AZ_DEG, CONFIG, EL_DEG, NOW, PLAN, SKY, path, ready, saw, status
 
+from acu_daemon.acu.commands import AcuMode, Backup, ReadFaults
+from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.control.orders import Orders
-from acu_daemon.control.safety.status_plausibility import contradictions
 from acu_daemon.control.state import ControlState, Held, Sent
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Exchange, Observation, Sky, TickInput
 from acu_daemon.control.tracking.state_table import TrackState
-from acu_daemon.drivers.sa3842.messages import AcuMode, Backup, Faults, ReadFaults, Status
+from acu_daemon.drivers.sa3842.field_status import contradictions
+from acu_daemon.drivers.sa3842.messages import Faults, Status
+from acu_daemon.drivers.sa3842.sa3842_driver import field_reply
 from acu_daemon.model import AxisLimits, Prediction, Reading
 
-FLAGS = [field.name for field in fields(Status) if field.name.startswith(("is_", "are_", "has_"))]
+FLAGS, BITS = (
+    [field.name for field in fields(kind) if field.name.startswith(("is_", "are_", "has_"))]
+    for kind in (AcuStatus, Status)
+)
 FAULT_FLAGS = ("has_azimuth_fault", "has_elevation_fault", "has_tilt_fault", "has_interlock_fault")
 ENDS = {"is_at_cw_limit": (1, 0), "is_at_ccw_limit": (-1, 0), "is_at_up_limit": (0, 1), "is_at_down_limit": (0, -1)}
 SIDES = {"clockwise": (1, 0), "counter-clockwise": (-1, 0), "up": (0, 1), "down": (0, -1)}
@@ -29,7 +35,7 @@ def standing(right_deg: float, up_deg: float) -> Sky:
     return Sky(Prediction(NOW - 5.0, 0.1, az, el, t, t, az, t, "FITTED", NOW), None, PLAN)
 
 
-def ticks(state: ControlState, statuses: list[Status], sky: Sky) -> tuple[ControlState, list[Orders]]:
+def ticks(state: ControlState, statuses: list[AcuStatus], sky: Sky) -> tuple[ControlState, list[Orders]]:
     """One tick for each status, at the period."""
     ordered = []
     for k, seen in enumerate(statuses):
@@ -156,7 +162,7 @@ def test_a_bit_alone_changes_the_orders_where_the_table_says_so_and_nowhere_else
 @pytest.mark.parametrize("others", [False, True])
 def test_a_fault_bit_that_comes_or_goes_is_asked_about_again(flag: str, others: bool) -> None:
     seen = status(AcuMode.FAULT, is_autotrack_selected=False, **dict.fromkeys(FAULT_FLAGS, others))
-    answered = saw(seen, extra=Exchange(ReadFaults(), Faults(azimuth=1)))
+    answered = saw(seen, extra=Exchange(ReadFaults(), field_reply(Faults(azimuth=1))))
     state, orders = tick(ready(TrackState.FAULT, seen), TickInput(answered, SKY, NOW), CONFIG)
     assert orders.extra is None
     _, orders = tick(state, TickInput(saw(replace(seen, **{flag: not others})), SKY, NOW + 0.2), CONFIG)
@@ -181,7 +187,7 @@ def test_a_standby_is_the_acus_own_where_an_interlock_fault_is_new_and_else_anot
 def test_of_the_fault_detail_the_emergency_stop_and_the_door_disarm_and_the_watchdogs_trip_excuses_a_standby(
     nibble: str, bit: int
 ) -> None:
-    faults = Faults(**{nibble: 1 << bit})
+    faults = field_reply(Faults(**{nibble: 1 << bit}))
     seen = status(AcuMode.FAULT, is_autotrack_selected=False, has_interlock_fault=True)
     state, _ = tick(
         ready(TrackState.FAULT, seen), TickInput(saw(seen, extra=Exchange(ReadFaults(), faults)), SKY, NOW), CONFIG
@@ -225,7 +231,7 @@ def consistent(mode: AcuMode) -> Status:
 
 
 @pytest.mark.parametrize("mode", CONSISTENT)
-@pytest.mark.parametrize("flag", FLAGS)
+@pytest.mark.parametrize("flag", BITS)
 def test_a_bit_that_belies_the_mode_is_named_and_every_other_bit_is_believed(mode: AcuMode, flag: str) -> None:
     seen = consistent(mode)
     assert contradictions(seen) == ()

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from memories import Judge, remembering
 
+from acu_daemon.acu.commands import AcuMode, Backup
+from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.axis_watch import AxesWatch, AxisSeen, Bounds, Duty, sky_scale, watch_axes
 from acu_daemon.control.safety.encoder_watch import FROZEN_DEG, EncoderWatch, watch_encoders
@@ -22,7 +24,6 @@ from acu_daemon.control.tracking.scan import DWELL_S, ON_PLACE_BEAMS, go_on, loo
 from acu_daemon.control.tracking.state_table import Cause, TrackState
 from acu_daemon.control.tracking.track_frame import beside, offset_of
 from acu_daemon.daemon.motion import Motion
-from acu_daemon.drivers.sa3842.messages import AcuMode, Backup, Status
 from acu_daemon.model import AxisLimits, Model, Pointing, Prediction, Reading
 from acu_daemon.pointing.axis import AxisState
 from acu_daemon.pointing.envelope import Envelope
@@ -163,7 +164,7 @@ def test_a_row_lies_beside_the_path_by_its_part_of_a_beam(el_deg: float) -> None
 
 
 def causes(
-    path: Prediction, place: tuple[float, float], track: TrackState, seen: Status, from_rise_s: float
+    path: Prediction, place: tuple[float, float], track: TrackState, seen: AcuStatus, from_rise_s: float
 ) -> set[Cause]:
     plan = PassPlan(NOW - from_rise_s, NOW + 500.0, NOW - 200.0, 100.0, path.at(NOW).el_deg)
     seen = replace(seen, az_deg=place[0] % 360.0, el_deg=place[1])
@@ -171,7 +172,7 @@ def causes(
     return find_causes(state, TickInput(Observation(), Sky(path, None, plan), NOW), CONFIG)
 
 
-IN_REMOTE = Status(0.0, 0.0, AcuMode.REMOTE, backup_selected=Backup.REMOTE)
+IN_REMOTE = AcuStatus(0.0, 0.0, AcuMode.REMOTE, backup_selected=Backup.REMOTE)
 SELECTED = replace(IN_REMOTE, mode=AcuMode.ACQUIRE, is_autotrack_selected=True)
 LOCKED = replace(SELECTED, mode=AcuMode.AUTOTRACK, is_acquired=True)
 
@@ -259,7 +260,7 @@ def test_p6_an_azimuth_is_judged_by_its_angle_on_the_sky(el_deg: float, side: in
 @pytest.mark.parametrize("side", [-1, 1])
 def test_a_status_is_doubted_and_confirmed_by_its_angle_on_the_sky(el_deg: float, side: int) -> None:
     drive = AxisLimits(-270.0, 270.0, 2.0, 10.0)
-    here = Status(100.0, el_deg, AcuMode.STANDBY)
+    here = AcuStatus(100.0, el_deg, AcuMode.STANDBY)
     cos_el = scale_of(el_deg)
     for share, is_believed in ((0.9, True), (1.1, False)):
         doubt = Judge(drive, drive)
@@ -277,7 +278,7 @@ def test_a_status_is_doubted_and_confirmed_by_its_angle_on_the_sky(el_deg: float
 @pytest.mark.parametrize("side", [-1, 1])
 def test_an_encoder_is_frozen_once_the_satellite_has_moved_so_far_on_the_sky(el_deg: float, side: int) -> None:
     cos_el = scale_of(el_deg)
-    status = Status(100.0, el_deg, AcuMode.AUTOTRACK)
+    status = AcuStatus(100.0, el_deg, AcuMode.AUTOTRACK)
     for moved_deg, is_frozen in ((0.9 * FROZEN_DEG, False), (1.1 * FROZEN_DEG, True)):
         path = Pointing(100.0, el_deg, side * moved_deg / cos_el, 0.0)  # in a second
         watch = EncoderWatch()
@@ -312,7 +313,7 @@ def test_an_elevation_that_outruns_its_drive_is_doubted_and_one_that_moves_is_no
     side: int,
 ) -> None:
     drive = AxisLimits(-270.0, 270.0, 2.0, 10.0)
-    here = Status(100.0, 40.0, AcuMode.STANDBY)
+    here = AcuStatus(100.0, 40.0, AcuMode.STANDBY)
     for share, is_believed in ((0.9, True), (1.1, False)):
         doubt = Judge(drive, drive)
         doubt.believes(here, NOW)

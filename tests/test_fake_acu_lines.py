@@ -8,19 +8,10 @@ from pathlib import Path
 import pytest
 from fake_sky import AZIMUTH, ELEVATION, START_TAI_S, Star
 
+from acu_daemon.acu.commands import AcuMode, Identify, Poll, SelectMode
 from acu_daemon.drivers.sa3842.codec import encode_command
 from acu_daemon.drivers.sa3842.exchange import HostExchange
-from acu_daemon.drivers.sa3842.messages import (
-    Ack,
-    AcuMode,
-    Command,
-    Identify,
-    Poll,
-    Reply,
-    SelectMode,
-    Status,
-    WriteAndPoll,
-)
+from acu_daemon.drivers.sa3842.messages import Ack, Command, Reply, Status, WriteAndPoll
 from acu_daemon.edge.clock import LoopClock, SystemClock
 from acu_daemon.edge.link import Link, make_link
 from acu_daemon.errors import LinkError, LinkRefusedError, UsageError

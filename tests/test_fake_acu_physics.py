@@ -9,17 +9,8 @@ from fake_sky import AZIMUTH, ELEVATION, START_TAI_S, Bench, Star
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acu_daemon.drivers.sa3842.messages import (
-    Ack,
-    AcuMode,
-    Backup,
-    Poll,
-    SelectBackup,
-    SelectMode,
-    Status,
-    WriteParameter,
-    WriteRegisters,
-)
+from acu_daemon.acu.commands import AcuMode, Backup, Poll, SelectBackup, SelectMode
+from acu_daemon.drivers.sa3842.messages import Ack, Status, WriteParameter, WriteRegisters
 from acu_daemon.model import AxisLimits, sky_angle_deg
 from acu_daemon.sim.command_registers import choose_turn, turns_within
 from acu_daemon.sim.pedestal import STEP_S, Axis, Follower

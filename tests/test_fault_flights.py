@@ -11,7 +11,8 @@ import pytest
 from fault_flights import ARM_S, CASES, FAULT_S, ON_PATH_DEG, WIRE_S, T, flown, measure
 from flights import commands_between, events_named, rows_between, seconds_to_state
 
-from acu_daemon.drivers.sa3842.messages import Poll, ReadFaults, ReadParameter, Stop, WriteParameter
+from acu_daemon.acu.commands import Poll, ReadFaults, Stop
+from acu_daemon.drivers.sa3842.messages import ReadParameter, WriteParameter
 from acu_daemon.sim.fault_verbs import FRAME_VERBS, PEDESTAL_VERBS, VERBS
 
 LINK_LOST_S = 0.7  # half a second of silence, and the tick that sees it

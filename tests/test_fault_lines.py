@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 from fake_sky import AZIMUTH, ELEVATION, START_TAI_S, Star
 
+from acu_daemon.acu.commands import AcuMode, Poll
 from acu_daemon.drivers.sa3842.codec import encode_command
 from acu_daemon.drivers.sa3842.exchange import HostExchange
-from acu_daemon.drivers.sa3842.messages import AcuMode, Poll, Status, WriteAndPoll
+from acu_daemon.drivers.sa3842.messages import Status, WriteAndPoll
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.link import Link, make_link
 from acu_daemon.errors import LinkError, LinkRefusedError, UsageError

@@ -8,9 +8,10 @@ from typing import get_args
 
 import pytest
 
+from acu_daemon.acu.commands import AcuMode, Backup, Poll
 from acu_daemon.drivers.sa3842.codec import ReplyDecoder, encode_command, encode_reply
 from acu_daemon.drivers.sa3842.frame import NAK
-from acu_daemon.drivers.sa3842.messages import Ack, AcuMode, Backup, Garbled, Nak, Poll, Status
+from acu_daemon.drivers.sa3842.messages import Ack, Garbled, Nak, Status
 from acu_daemon.errors import ConfigError
 from acu_daemon.sim.fault_board import FaultBoard
 from acu_daemon.sim.fault_verbs import (

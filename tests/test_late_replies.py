@@ -11,20 +11,14 @@ from flights import RISING_TAI_S, climb, events_named, seconds_to_state, state_a
 from hypothesis import given
 from hypothesis import strategies as st
 
+from acu_daemon.acu.commands import Identify, PointAndPoll, Poll, ReadFaults
+from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.assist.session.refit import RefitReply, RefitRequest
 from acu_daemon.cli.virtual_pass import Flight
 from acu_daemon.daemon.port import AcuPort, Answer
 from acu_daemon.drivers.sa3842.codec import CMD_OF, DEFAULT_ADDRESS, CommandDecoder, encode_reply
-from acu_daemon.drivers.sa3842.messages import (
-    Command,
-    Identify,
-    Identity,
-    Poll,
-    ReadFaults,
-    ReadRegisters,
-    Status,
-    WriteAndPoll,
-)
+from acu_daemon.drivers.sa3842.messages import Command, Identity, ReadRegisters, WriteAndPoll
+from acu_daemon.drivers.sa3842.sa3842_driver import Sa3842Driver
 from acu_daemon.drivers.sa3842.status_block import decode_status
 from acu_daemon.edge.arrivals import Arrivals
 from acu_daemon.edge.clock import LoopClock
@@ -89,23 +83,23 @@ def dialogue(delays_s: list[float], *, in_order: bool) -> tuple[list[tuple[int, 
     async def main() -> Clocked:
         clock = LoopClock(START_TAI_S)
         link = Clocked(clock, cycle(delays_s), in_order=in_order)
-        port = AcuPort(link, clock, DEFAULT_ADDRESS, 0.1, 0.010)
+        port = AcuPort(link, clock, Sa3842Driver(), 0.1, 0.010)
         for tick in range(30):
             await clock.sleep_until(START_TAI_S + 0.1 * tick)
-            command = port.question() if port.must_poll else WriteAndPoll(0.0, 0.0)
+            command = port.question() if port.must_poll else PointAndPoll(0.0, 0.0)
             if command is not None:
                 number = len(link.commands)
                 answer = await port.exchange(command)
                 if answer.reply is None:
                     link.failed[number] = clock.monotonic_s()
-                if isinstance(answer.reply, Status) and answer.is_sure:
+                if isinstance(answer.reply, AcuStatus) and answer.is_sure:
                     answers.append((number, answer))
         return link
 
     return answers, run_virtual(main())
 
 
-def number_of(status: Status) -> int:
+def number_of(status: AcuStatus) -> int:
     return round(status.el_deg / 360.0 * 65536)
 
 
@@ -116,7 +110,7 @@ DELAYS_S = st.lists(st.sampled_from([0.005, 0.02, 0.085, 0.091, 0.11, 0.13, 0.15
 def test_no_sure_status_is_an_older_ones_whatever_the_delays_of_a_line_that_keeps_order(delays_s: list[float]) -> None:
     answers, _ = dialogue(delays_s, in_order=True)
     for number, answer in answers:
-        assert isinstance(answer.reply, Status)
+        assert isinstance(answer.reply, AcuStatus)
         assert number_of(answer.reply) == number
 
 
@@ -127,7 +121,7 @@ def test_no_sure_status_is_an_older_ones_where_one_late_reply_is_overtaken(at: i
     answers, _ = dialogue(delays_s, in_order=False)
     assert len(answers) >= 22
     for number, answer in answers:
-        assert isinstance(answer.reply, Status)
+        assert isinstance(answer.reply, AcuStatus)
         assert number_of(answer.reply) == number
 
 

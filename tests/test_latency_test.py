@@ -13,11 +13,12 @@ from command_line import acu_daemon
 from config_files import STATION, write
 from real_acu import real_acu
 
+from acu_daemon.acu.commands import Identify, Poll
 from acu_daemon.cli.latency_test import _link, fits, histogram
 from acu_daemon.config.load import load_station
 from acu_daemon.daemon.latency_trial import Trial
 from acu_daemon.daemon.tick_lateness import Lateness
-from acu_daemon.drivers.sa3842.messages import Identify, Poll
+from acu_daemon.drivers.sa3842.sa3842_driver import Sa3842Driver
 from acu_daemon.edge.link import make_link
 
 realtime = pytest.mark.realtime
@@ -42,9 +43,9 @@ def test_percentiles_are_of_the_newest_ticks() -> None:
 
 @pytest.mark.parametrize(("latency_ms", "one_ms", "both_ms"), [(2, 49.9, 71.7), (10, 57.9, 87.7), (20, 67.9, 107.7)])
 def test_what_fits_at_9600_baud_is_the_icds_table(latency_ms: int, one_ms: float, both_ms: float) -> None:
-    finding = fits(make_link("tcp://127.0.0.1:1?baud=9600"), 0.1, latency_ms / 1e3, "measured")
+    finding = fits(make_link("tcp://127.0.0.1:1?baud=9600"), Sa3842Driver(), 0.1, latency_ms / 1e3, "measured")
     assert finding.verdict == "GO"
-    assert f"WRITE AND STATUS {one_ms:.1f} of 95 ms" in finding.detail
+    assert f"a command and its status {one_ms:.1f} of 95 ms" in finding.detail
     assert f"{both_ms:.1f} ms" in finding.detail
     assert ("does not fit" in finding.detail) == (both_ms > 95.0)
 
@@ -58,7 +59,7 @@ def test_a_line_whose_replies_all_come_too_late_is_no_go(tmp_path: Path) -> None
 
 
 def test_a_line_too_slow_for_a_write_each_period_is_no_go() -> None:
-    finding = fits(make_link("tcp://127.0.0.1:1?baud=4800"), 0.1, 0.010, "measured")
+    finding = fits(make_link("tcp://127.0.0.1:1?baud=4800"), Sa3842Driver(), 0.1, 0.010, "measured")
     assert finding.verdict == "NO-GO"
     assert "use a higher baud rate or a longer period" in finding.detail
 
@@ -100,7 +101,7 @@ def test_the_acu_is_polled_and_told_nothing_else(tmp_path: Path) -> None:
     assert set(asked) <= {Poll(), Identify()}  # that one after a reply that came too late
     assert len(asked) >= json.loads(figures.read_text())["tick_count"] > 0
     assert "polls lost" in tested.out
-    assert "WRITE AND STATUS" in tested.out
+    assert "a command and its status" in tested.out
 
 
 @realtime

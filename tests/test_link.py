@@ -19,6 +19,7 @@ import pytest
 import serial
 from unprivileged import as_nobody
 
+from acu_daemon.drivers.sa3842.sa3842_driver import Sa3842Driver
 from acu_daemon.edge.arrivals import MAX_WAITING_BYTES, Arrivals
 from acu_daemon.edge.link import check_rate, make_link, open_once
 from acu_daemon.edge.serial_port import SerialLink
@@ -610,7 +611,7 @@ def test_the_time_of_a_character_comes_from_the_baud_rate_named_in_the_url() -> 
 
 
 def test_a_rate_that_cannot_carry_the_cycle_is_refused_with_the_arithmetic() -> None:
-    check_rate(make_link("tcp://acu:3842"), 0.1, 0.010)
-    check_rate(make_link("serial:///dev/ttyS0"), 0.1, 0.020)
+    check_rate(make_link("tcp://acu:3842"), Sa3842Driver(), 0.1, 0.010)
+    check_rate(make_link("serial:///dev/ttyS0"), Sa3842Driver(), 0.1, 0.020)
     with pytest.raises(UsageError, match=r"46 characters of 2\.083 ms and 10 ms .* make 105\.8 ms, and only 95 ms"):
-        check_rate(make_link("serial:///dev/ttyS0?baud=4800"), 0.1, 0.010)
+        check_rate(make_link("serial:///dev/ttyS0?baud=4800"), Sa3842Driver(), 0.1, 0.010)

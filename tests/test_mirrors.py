@@ -8,12 +8,12 @@ import pytest
 from mirrors import MIRRORS, Mirror
 from troubled_decision import TroubledDecision
 
+from acu_daemon.acu.commands import Command, PointAndPoll, PointAt
 from acu_daemon.control.orders import Orders
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import TickInput
 from acu_daemon.drivers.sa3842.angles import LSB_DEG
-from acu_daemon.drivers.sa3842.messages import Command, WriteAndPoll, WriteRegisters
 
 SEEDS = range(24)
 TICKS = 300
@@ -60,7 +60,7 @@ def lags(state: ControlState) -> list[float]:
 
 
 def same(command: Command | None, of_mirror: Command | None, mirror: Mirror) -> bool:
-    if not isinstance(command, WriteAndPoll | WriteRegisters):
+    if not isinstance(command, PointAndPoll | PointAt):
         return command == of_mirror
     if type(command) is not type(of_mirror):
         return False

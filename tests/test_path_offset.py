@@ -11,13 +11,13 @@ from memories import remembering
 from test_daemon_events import NeverFitting
 from test_tick import AZ_DEG, CONFIG, EL_DEG, NOW, PLAN, SKY, ready, saw, status
 
+from acu_daemon.acu.commands import AcuMode, PointAndPoll
 from acu_daemon.assist.session.prediction import predict
 from acu_daemon.control.state import ControlState, PathOffset
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Sky, TickInput
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.control.tracking.track_frame import beside, extents, offset_of
-from acu_daemon.drivers.sa3842.messages import AcuMode, WriteAndPoll
 from acu_daemon.model import Model, Prediction, sky_angle_deg
 from acu_daemon.orbit.look import look_at
 from acu_daemon.sim.scenario import SkyErrors
@@ -97,7 +97,7 @@ def test_forty_degrees_aside_are_refused_once_told_and_drive_nothing() -> None:
     assert state.signal.offset is None
     again, orders = tick(state, TickInput(saw(wrong), SKY, NOW + 0.1), CONFIG)
     assert [event.name for event in orders.events] == []
-    assert isinstance(orders.first, WriteAndPoll)
+    assert isinstance(orders.first, PointAndPoll)
     assert orders.first.az_deg == pytest.approx(AZ_DEG, abs=0.2)
     held, _ = tick(again, TickInput(saw(status(AcuMode.REMOTE_BACKUP)), SKY, NOW + 0.2), CONFIG)
     assert (held.tracking.track, held.signal.offset) == (TrackState.HOLD_TLE, None)
@@ -130,7 +130,7 @@ def test_what_was_learned_beside_one_model_is_not_put_beside_another() -> None:
     assert SKY.prediction is not None
     other = Sky(replace(SKY.prediction, model=Model.LAST_PASS), None, PLAN)
     _, orders = tick(learned(), TickInput(saw(status(AcuMode.REMOTE_BACKUP)), other, NOW), CONFIG)
-    assert isinstance(orders.first, WriteAndPoll)
+    assert isinstance(orders.first, PointAndPoll)
     assert orders.first.az_deg == pytest.approx(AZ_DEG, abs=0.1)
 
 

@@ -6,10 +6,11 @@ from collections.abc import Awaitable, Callable
 import pytest
 from fake_sky import AZIMUTH, ELEVATION, START_TAI_S, Star
 
-from acu_daemon.daemon.port import EXCHANGE_DEADLINE_S, FIRST_POLL_S, AcuPort
+from acu_daemon.acu.commands import AcuMode, PointAndPoll, PointAt, Poll, SelectMode, Stop
+from acu_daemon.acu.replies import AcuStatus, Done, Refused
+from acu_daemon.daemon.port import FIRST_POLL_S, AcuPort
 from acu_daemon.daemon.stopping import DEADLINE_S, stop_antenna
-from acu_daemon.drivers.sa3842.codec import DEFAULT_ADDRESS
-from acu_daemon.drivers.sa3842.messages import Ack, AcuMode, Nak, Poll, SelectMode, Status, Stow, WriteAndPoll
+from acu_daemon.drivers.sa3842.sa3842_driver import SA3842, Sa3842Driver
 from acu_daemon.edge.clock import LoopClock
 from acu_daemon.errors import LinkError
 from acu_daemon.sim.acu import FakeAcu
@@ -32,7 +33,7 @@ def play(story: Story, *, latency_s: float = 0.010, byte_time_s: float = 0.0, is
         scenario = Scenario(acu=AcuChoice(reply_latency_s=latency_s))
         acu = FakeAcu(AcuParts(AZIMUTH, ELEVATION, 1.0, Star(), START_TAI_S, scenario))
         link = MemoryLink(acu, clock, byte_time_s)
-        port = AcuPort(link, clock, DEFAULT_ADDRESS, 0.1, 0.010)
+        port = AcuPort(link, clock, Sa3842Driver(), 0.1, 0.010)
         async with asyncio.TaskGroup() as group:
             if is_kept:
                 keeper = group.create_task(port.keep())
@@ -50,7 +51,7 @@ def test_an_exchange_brings_the_reply_and_the_times_of_its_write_and_its_first_b
     async def story(port: AcuPort, _link: MemoryLink, clock: LoopClock) -> None:
         began = clock.tai_s()
         answer = await port.exchange(Poll())
-        assert isinstance(answer.reply, Status)
+        assert isinstance(answer.reply, AcuStatus)
         assert answer.started_tai_s == began
         assert answer.first_byte_tai_s == pytest.approx(began + 0.010, abs=1e-6)
 
@@ -61,14 +62,14 @@ def test_a_reply_that_does_not_come_fails_at_the_deadline_and_the_next_command_m
     async def story(port: AcuPort, link: MemoryLink, clock: LoopClock) -> None:
         link.is_cut = True
         began = clock.monotonic_s()
-        answer = await port.exchange(WriteAndPoll(0.0, 45.0))
+        answer = await port.exchange(PointAndPoll(0.0, 45.0))
         assert answer.reply is None
-        assert clock.monotonic_s() - began == pytest.approx(EXCHANGE_DEADLINE_S, abs=1e-6)
+        assert clock.monotonic_s() - began == pytest.approx(SA3842.reply_deadline_s, abs=1e-6)
         assert port.must_poll
         link.is_cut = False
         with pytest.raises(RuntimeError, match="Poll"):
             await port.exchange(SelectMode(AcuMode.REMOTE))
-        assert isinstance((await port.exchange(Poll())).reply, Status)
+        assert isinstance((await port.exchange(Poll())).reply, AcuStatus)
         assert not port.must_poll
         assert port.failed_exchange_count == 1
 
@@ -77,7 +78,7 @@ def test_a_reply_that_does_not_come_fails_at_the_deadline_and_the_next_command_m
 
 def test_a_late_reply_is_not_taken_for_the_next_one() -> None:
     async def story(port: AcuPort, _link: MemoryLink, _clock: LoopClock) -> None:
-        assert (await port.exchange(WriteAndPoll(10.0, 45.0))).reply is None  # its reply comes after 120 ms
+        assert (await port.exchange(PointAndPoll(10.0, 45.0))).reply is None  # its reply comes after 120 ms
         await asyncio.sleep(0.025)
         assert (await port.exchange(Poll())).reply is None
         assert port.discarded_count >= 1
@@ -90,8 +91,8 @@ def test_p8_a_reply_that_came_in_time_counts_though_the_loop_looked_after_the_de
         began_s = clock.monotonic_s()
         asyncio.get_running_loop().call_later(0.005, stand_still, 0.200)
         answer = await port.exchange(Poll())  # answered after 10 ms
-        assert isinstance(answer.reply, Status)
-        assert clock.monotonic_s() - began_s > EXCHANGE_DEADLINE_S
+        assert isinstance(answer.reply, AcuStatus)
+        assert clock.monotonic_s() - began_s > SA3842.reply_deadline_s
         assert (port.failed_exchange_count, port.must_poll) == (0, False)
 
     play(story)
@@ -106,8 +107,8 @@ def stand_still(seconds: float) -> None:
 
 def test_a_refusal_is_an_answer() -> None:
     async def story(port: AcuPort, _link: MemoryLink, _clock: LoopClock) -> None:
-        assert (await port.exchange(Stow())).reply == Ack()
-        assert (await port.exchange(SelectMode(AcuMode.AUTOTRACK))).reply == Nak()
+        assert (await port.exchange(Stop())).reply == Done()
+        assert (await port.exchange(PointAt(0.0, 120.0))).reply == Refused()
 
     play(story)
 
@@ -116,10 +117,10 @@ def test_p2_a_silent_link_is_dropped_and_opened_again() -> None:
     async def story(port: AcuPort, link: MemoryLink, _clock: LoopClock) -> None:
         link.is_cut = True
         await port.exchange(Poll())
-        port.drop_if_silent(0.5)
+        port.drop_if_silent()
         assert port.is_up
         await asyncio.sleep(0.6)
-        port.drop_if_silent(0.5)
+        port.drop_if_silent()
         assert not port.is_up
         link.is_cut = False
         await asyncio.sleep(1.5)
@@ -147,7 +148,7 @@ def test_a_connection_that_was_lost_is_closed_before_the_next_one_is_opened() ->
         link.open, link.close = noted_open, noted_close
         for _ in range(3):
             await asyncio.sleep(1.0)
-            port.drop_if_silent(0.5)
+            port.drop_if_silent()
             await asyncio.sleep(0.2)
             await port.wait_until_up()
         assert done == ["close", "open"] * 3
@@ -199,7 +200,7 @@ def test_a_link_counts_as_up_only_when_the_acu_answered_on_it() -> None:
         acu = FakeAcu(AcuParts(AZIMUTH, ELEVATION, 1.0, Star(), START_TAI_S, Scenario()))
         link = MemoryLink(acu, clock)
         link.is_cut = True
-        port = AcuPort(link, clock, DEFAULT_ADDRESS, 0.1, 0.010)
+        port = AcuPort(link, clock, Sa3842Driver(), 0.1, 0.010)
         async with asyncio.TaskGroup() as group:
             keeper = group.create_task(port.keep())
             await asyncio.sleep(3.0)
@@ -221,7 +222,7 @@ def test_a_link_that_breaks_in_mid_write_is_no_exception_but_a_failed_exchange()
     async def main() -> None:
         clock = LoopClock(START_TAI_S)
         link = Dead(FakeAcu(AcuParts(AZIMUTH, ELEVATION, 1.0, Star(), START_TAI_S, Scenario())), clock)
-        port = AcuPort(link, clock, DEFAULT_ADDRESS, 0.1, 0.010)
+        port = AcuPort(link, clock, Sa3842Driver(), 0.1, 0.010)
         await link.open()
         assert (await port.exchange(Poll())).reply is None
         assert port.problem == "the adapter was pulled out"
@@ -237,7 +238,7 @@ def test_at_9600_baud_there_is_room_for_a_second_exchange_only_while_the_acu_is_
 
     async def story(port: AcuPort, _link: MemoryLink, clock: LoopClock) -> None:
         began = clock.monotonic_s()
-        assert (await port.exchange(WriteAndPoll(10.0, 45.0))).reply is not None
+        assert (await port.exchange(PointAndPoll(10.0, 45.0))).reply is not None
         assert clock.monotonic_s() - began == pytest.approx(WIRE_S + latency_s, abs=1e-3)
         assert port.has_room is has_room
 
@@ -277,7 +278,7 @@ def test_an_open_link_is_asked_for_more_than_half_a_second_before_it_is_closed()
         link.is_cut = True
         await port.exchange(Poll())
         await asyncio.sleep(0.5)
-        port.drop_if_silent(0.5)
+        port.drop_if_silent()
         opened_s: list[float] = []
         opens = link.open
 
@@ -290,7 +291,7 @@ def test_an_open_link_is_asked_for_more_than_half_a_second_before_it_is_closed()
         link.is_cut = False
         await port.wait_until_up()
         assert len(opened_s) == 1
-        assert clock.monotonic_s() - opened_s[0] < FIRST_POLL_S + EXCHANGE_DEADLINE_S
+        assert clock.monotonic_s() - opened_s[0] < FIRST_POLL_S + SA3842.reply_deadline_s
 
     play(story)
 

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from acu_daemon.acu.commands import AcuMode, Backup, Identify, Poll, ReadFaults, SelectMode, Stop
 from acu_daemon.drivers.sa3842.angles import (
     azimuth_code,
     azimuth_deg,
@@ -25,25 +26,19 @@ from acu_daemon.drivers.sa3842.codec import (
     exchange_bytes,
 )
 from acu_daemon.drivers.sa3842.exchange import HostExchange
+from acu_daemon.drivers.sa3842.field_status import field_status
 from acu_daemon.drivers.sa3842.frame import ACK, MAX_DATA_BYTES, NAK, STX, BadFrame, Frame, FrameDecoder, encode_frame
 from acu_daemon.drivers.sa3842.messages import (
     Ack,
-    AcuMode,
-    Backup,
     Command,
     Faults,
     Garbled,
-    Identify,
     Identity,
     Nak,
-    Poll,
-    ReadFaults,
     ReadParameter,
     ReadRegisters,
     Reply,
-    SelectMode,
     Status,
-    Stop,
     WriteAndPoll,
     WriteParameter,
     WriteRegisters,
@@ -410,7 +405,7 @@ def test_the_registers_are_followed_in_the_modes_section_5_names() -> None:
         (mode, backup)
         for mode in AcuMode
         for backup in Backup
-        if Status(0, 0, mode, backup_selected=backup).follows_registers
+        if field_status(Status(0, 0, mode, backup_selected=backup)).follows_registers
     }
     assert followed == {
         *((mode, backup) for mode in (AcuMode.REMOTE, AcuMode.REMOTE_BACKUP) for backup in Backup),

@@ -7,10 +7,11 @@ from typing import Any
 import pytest
 from test_tick import CONFIG, NOW, status
 
+from acu_daemon.acu.commands import Poll
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.foreground import Foreground
 from acu_daemon.daemon.port import Answer
-from acu_daemon.drivers.sa3842.messages import Command, Poll, WriteAndPoll
+from acu_daemon.drivers.sa3842.messages import Command, WriteAndPoll
 from acu_daemon.model import Reading
 
 AT_9600 = replace(CONFIG, sample_delay_s=0.0277, poll_sample_delay_s=0.0152)  # 17 and 5 bytes, and 10 ms

@@ -15,7 +15,8 @@ from config_files import BROUWER, STATION, replaced, write
 from real_acu import real_acu
 from script_modules import load
 
-from acu_daemon.drivers.sa3842.messages import Identify, Poll, ReadFaults, ReadParameter, ReadRegisters, Stop
+from acu_daemon.acu.commands import Identify, Poll, ReadFaults, Stop
+from acu_daemon.drivers.sa3842.messages import ReadParameter, ReadRegisters
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.latch import LATCH
 from acu_daemon.orbit.timescales import utc_text

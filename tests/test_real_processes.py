@@ -23,7 +23,8 @@ from late_writes import late_deg
 from real_acu import real_acu
 from script_modules import load
 
-from acu_daemon.drivers.sa3842.messages import Identify, Poll, ReadRegisters
+from acu_daemon.acu.commands import Identify, Poll
+from acu_daemon.drivers.sa3842.messages import ReadRegisters
 from acu_daemon.report.pass_trace import read_trace
 from acu_daemon.report.wire import read_writes
 

@@ -9,34 +9,31 @@ import pytest
 from fake_sky import AZIMUTH, ELEVATION
 from memories import Judge, remembering
 
+from acu_daemon.acu.commands import (
+    AcuMode,
+    Backup,
+    Command,
+    Identify,
+    PointAndPoll,
+    PointAt,
+    Poll,
+    ReadCommanded,
+    ReadTurnChoice,
+    ReadWatchdog,
+)
+from acu_daemon.acu.replies import AcuStatus, Commanded, Done, Refused, Reply, TurnChoice, WatchdogTime
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.axis_watch import AWAY_S, AxesWatch, AxisSeen, Bounds, Duty, watch_axes
 from acu_daemon.control.safety.encoder_watch import EncoderWatch, watch_encoders
 from acu_daemon.control.safety.status_plausibility import CONTRADICTING_COUNT, MOVED_COUNT
 from acu_daemon.control.safety.turn import BIT_SCORE, DENIED_COUNT, TurnWatch, locate, watch_pull
-from acu_daemon.control.startup import WATCHDOG, WATCHDOG_TRY_S, after_reply
+from acu_daemon.control.startup import WATCHDOG_TRY_S, after_reply
 from acu_daemon.control.state import ControlState, StartStage, Watchdog
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Sky, TickInput
 from acu_daemon.control.tracking.state_table import TrackState
-from acu_daemon.drivers.sa3842.messages import (
-    Ack,
-    AcuMode,
-    Backup,
-    Command,
-    Identify,
-    Identity,
-    Nak,
-    Parameter,
-    Poll,
-    ReadParameter,
-    ReadRegisters,
-    RegisterContents,
-    Reply,
-    Status,
-    WriteAndPoll,
-    WriteRegisters,
-)
+from acu_daemon.drivers.sa3842.messages import Identity
+from acu_daemon.drivers.sa3842.sa3842_driver import field_reply
 from acu_daemon.model import Correction, FitResult, Pointing, Prediction, Reading
 from acu_daemon.pointing.envelope import Envelope
 
@@ -62,11 +59,11 @@ def fitted() -> Prediction:
 SKY = Sky(fitted(), FIT, PLAN)
 
 
-def good(k: int) -> Status:
+def good(k: int) -> AcuStatus:
     """Autotrack on the path, at the time of the reading."""
     s = PERIOD_S * k - 0.09
     az, el = (round(one / CODE_DEG) * CODE_DEG for one in (150.0 + 0.8 * s, 50.0 - 0.3 * s))
-    return Status(
+    return AcuStatus(
         *(az, el, AcuMode.AUTOTRACK),
         backup_selected=Backup.REMOTE,
         is_autotrack_selected=True,
@@ -78,12 +75,14 @@ def good(k: int) -> Status:
 def reply_to(command: Command, written: tuple[float, float]) -> Reply:
     match command:
         case Identify():
-            return Identity("3842", "01")
-        case ReadRegisters():
-            return RegisterContents(written[0] % 360.0, written[1], 0, 1)
-        case ReadParameter(name=name):
-            return Parameter(name, 0)
-    return Ack()
+            return field_reply(Identity("3842", "01"))
+        case ReadCommanded():
+            return Commanded(written[0] % 360.0, written[1])
+        case ReadTurnChoice():
+            return TurnChoice(is_nearest=True)
+        case ReadWatchdog():
+            return WatchdogTime(0.0)
+    return Done()
 
 
 Change = Callable[[Observation, Sky, int], tuple[Observation, Sky]]
@@ -109,9 +108,9 @@ def run(change: Change | None, lasts: int) -> tuple[ControlState, list[str]]:
         state, orders = tick(state, TickInput(seen, sky, now), CONFIG)
         names += [event.name for event in orders.events]
         for command in (orders.first, orders.extra):
-            if isinstance(command, WriteAndPoll | WriteRegisters):
+            if isinstance(command, PointAndPoll | PointAt):
                 written = command.az_deg, command.el_deg
-        asked = orders.extra or (None if isinstance(orders.first, Poll | WriteAndPoll) else orders.first)
+        asked = orders.extra or (None if isinstance(orders.first, Poll | PointAndPoll) else orders.first)
         extra = None if asked is None else Exchange(asked, reply_to(asked, written))
     return state, names
 
@@ -139,11 +138,11 @@ def under(**changes: object) -> Change:
     return lambda seen, sky, _k: (seen, replace(sky, **changes))
 
 
-LOSS = shown(mode=AcuMode.REMOTE_BACKUP, is_acquired=False, is_backup_active=True)
+LOSS = shown(mode=AcuMode.REMOTE_BACKUP, is_acquired=False)
 ABOVE = replace(fitted(), el_deg=fitted().el_deg + 60.0)
 TROUBLES: dict[str, tuple[Change, int, set[str]]] = {
-    "a refused write": (given(refused=Nak(), status=None, reading=None), 1, set()),
-    "refused writes": (given(refused=Nak(), status=None, reading=None), 20, set()),
+    "a refused write": (given(refused=Refused(), status=None, reading=None), 1, set()),
+    "refused writes": (given(refused=Refused(), status=None, reading=None), 20, set()),
     "two lost replies": (lost, 3, set()),
     "a lost link": (lost, 20, OF_A_START),
     "polls": (given(must_poll=True), 10, set()),
@@ -189,8 +188,8 @@ def test_after_good_ticks_the_memory_is_that_of_a_run_without_the_trouble(troubl
 
 @pytest.mark.parametrize("bad", range(1, CONTRADICTING_COUNT))
 def test_doubtful_statuses_add_up_only_in_a_row(bad: int) -> None:
-    doubt, right = Judge(AZIMUTH, ELEVATION), replace(good(0), has_changed=True)
-    wrong, k, believed = replace(right, is_backup_active=True), 0, []
+    doubt, right = Judge(AZIMUTH, ELEVATION), good(0)
+    wrong, k, believed = replace(right, contradictions=("mode and backup",)), 0, []
     doubt.believes(right, NOW)
     for _ in range(5):
         for status in (*[wrong] * bad, right):
@@ -205,7 +204,7 @@ def test_doubtful_statuses_add_up_only_in_a_row(bad: int) -> None:
 
 def test_wild_azimuths_and_wrong_bits_add_up_only_without_good_ones_between() -> None:
     watch, az_deg = TurnWatch(), 260.0  # a bearing of 300 deg is reached on the other turn alone
-    at = Status(260.0, 40.0, AcuMode.REMOTE, is_sector_high=True)
+    at = AcuStatus(260.0, 40.0, AcuMode.REMOTE, is_sector_high=True)
     for _ in range(6):
         for status in [replace(at, az_deg=300.0)] * (DENIED_COUNT - 2) + [at]:
             watch, az_deg = locate(watch, status, AZIMUTH, az_deg)
@@ -256,10 +255,10 @@ def test_tries_of_the_register_watchdog_that_an_answer_ended_do_not_count_for_th
     state, now = remembering(stage=StartStage.READY, status=good(0)), NOW
     for _ in range(3):
         for share in (0.0, 0.9):
-            silent = Exchange(ReadParameter(WATCHDOG), None)
+            silent = Exchange(ReadWatchdog(), None)
             state = after_reply(state, silent, now + share * WATCHDOG_TRY_S, config, [])
             assert state.startup.watchdog is Watchdog.UNKNOWN
-        answered = Exchange(ReadParameter(WATCHDOG), Parameter(WATCHDOG, 100))
+        answered = Exchange(ReadWatchdog(), WatchdogTime(2.0))
         state = after_reply(state, answered, now + 0.95 * WATCHDOG_TRY_S, config, [])
         assert state.startup.watchdog is Watchdog.SET
         state, now = remembering(state, watchdog=Watchdog.UNKNOWN), now + 10.0
@@ -267,7 +266,7 @@ def test_tries_of_the_register_watchdog_that_an_answer_ended_do_not_count_for_th
 
 def test_writes_refused_now_and_then_are_not_paused() -> None:
     def change(seen: Observation, sky: Sky, k: int) -> tuple[Observation, Sky]:
-        return (replace(seen, refused=Nak()), sky) if (k - BEGIN) % 25 == 0 else (seen, sky)
+        return (replace(seen, refused=Refused()), sky) if (k - BEGIN) % 25 == 0 else (seen, sky)
 
     after, _ = run(change, 250)
     assert after.registers.refused_until_tai_s <= after.registers.refused_tai_s

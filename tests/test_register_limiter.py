@@ -8,11 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from memories import remembering
 
+from acu_daemon.acu.commands import AcuMode
+from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.intake import RATE_READINGS
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tracking.register_limiter import limit
-from acu_daemon.drivers.sa3842.messages import AcuMode, Status
 from acu_daemon.model import AxisLimits, Pointing
 from acu_daemon.pointing.axis import AxisState
 from acu_daemon.pointing.envelope import Envelope
@@ -27,7 +28,7 @@ any_angle = st.floats(allow_nan=True, allow_infinity=True) | st.floats(-400, 400
 
 def at(az_deg: float, el_deg: float, az_rate: float = 0.0, el_rate: float = 0.0) -> ControlState:
     return remembering(
-        status=Status(az_deg % 360.0, el_deg, AcuMode.REMOTE),
+        status=AcuStatus(az_deg % 360.0, el_deg, AcuMode.REMOTE),
         az_deg=az_deg,
         axis_az=AxisState(az_deg, az_rate),
         axis_el=AxisState(el_deg, el_rate),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from acu_daemon.drivers.sa3842.messages import AcuMode
+from acu_daemon.acu.commands import AcuMode
 from acu_daemon.report.pass_trace import Trace, measure, read_trace
 from acu_daemon.report.plot import plot_passes
 from acu_daemon.sim.trace import TraceRow, TraceWriter

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from acu_daemon.drivers.sa3842.messages import AcuMode
+from acu_daemon.acu.commands import AcuMode
 from acu_daemon.errors import ConfigError, UsageError
 from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.sim.scenario import AcuChoice, Encoder, Loss, ReceiverChoice, Scenario, SkyErrors, read_scenario

@@ -5,37 +5,34 @@ from dataclasses import replace
 import pytest
 from memories import remembering
 
+from acu_daemon.acu.commands import (
+    READS,
+    AcuMode,
+    Command,
+    FreeTurnChoice,
+    Identify,
+    PointAt,
+    ReadCommanded,
+    ReadFaults,
+    ReadTurnChoice,
+    Stop,
+)
+from acu_daemon.acu.replies import AcuStatus, Commanded, Done, Refused, Reply, TurnChoice
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.arming import last_command
 from acu_daemon.control.startup import after_reply, next_command
 from acu_daemon.control.state import ControlState, StartStage
 from acu_daemon.control.tick_input import Exchange
 from acu_daemon.drivers.sa3842.angles import LSB_DEG
-from acu_daemon.drivers.sa3842.messages import (
-    Ack,
-    AcuMode,
-    Command,
-    Identify,
-    Identity,
-    Nak,
-    Parameter,
-    ReadParameter,
-    ReadRegisters,
-    RegisterContents,
-    Reply,
-    Status,
-    Stop,
-    WriteParameter,
-    WriteRegisters,
-)
-from acu_daemon.drivers.sa3842.status_block import decode_status
+from acu_daemon.drivers.sa3842.field_status import read_field_status
+from acu_daemon.drivers.sa3842.messages import Identity
+from acu_daemon.drivers.sa3842.sa3842_driver import field_reply
 from acu_daemon.model import AxisLimits
 from acu_daemon.pointing.envelope import Envelope
 
 CONFIG = ControlConfig(Envelope(AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0)))
 AZ_DEG, EL_DEG = 22464 * LSB_DEG, 10322 * LSB_DEG  # angles an encoder can show, near 123.4 and 56.7
 NOW = 1000.0  # TAI
-READS = (Identify, ReadRegisters, ReadParameter)
 
 
 class SmallAcu:
@@ -49,23 +46,23 @@ class SmallAcu:
         self.asked.append(command)
         match command:
             case Identify():
-                return Identity("3842", "S2")
-            case ReadRegisters():
+                return field_reply(Identity("3842", "S2"))
+            case ReadCommanded():
                 az_deg, el_deg = (round(angle / LSB_DEG) * LSB_DEG for angle in self.registers)
-                return RegisterContents(az_deg % 360.0, el_deg, 77, self.count)
-            case ReadParameter(name="S"):
-                return Parameter("S", self.sector)
-            case WriteParameter(name="S", code=code):
-                self.sector = code
-                return Ack()
-            case WriteRegisters(az_deg=az_deg, el_deg=el_deg):
+                return Commanded(az_deg % 360.0, el_deg)
+            case ReadTurnChoice():
+                return TurnChoice(is_nearest=self.sector == 0)
+            case FreeTurnChoice():
+                self.sector = 0
+                return Done()
+            case PointAt(az_deg=az_deg, el_deg=el_deg):
                 self.registers, self.count = (az_deg, el_deg), self.count + 1
-                return Ack()
-        return Nak()
+                return Done()
+        return Refused()
 
 
-def status(**changes: object) -> Status:
-    standby = decode_status("0" * 23)
+def status(**changes: object) -> AcuStatus:
+    standby = read_field_status("0" * 23)
     return replace(
         standby,
         mode=AcuMode.STANDBY,
@@ -99,11 +96,10 @@ def test_p1_a_start_polls_identifies_reads_writes_the_present_angles_and_reads_t
     acu = SmallAcu()
     state = start(standing(), acu)
     assert acu.asked == [
-        *(Identify(), ReadRegisters(), ReadParameter("S")),
-        *(WriteRegisters(AZ_DEG, EL_DEG), ReadRegisters()),
+        *(Identify(), ReadCommanded(), ReadTurnChoice()),
+        *(PointAt(AZ_DEG, EL_DEG), ReadCommanded()),
     ]
     assert state.startup.stage is StartStage.READY
-    assert state.startup.tilt_code == 77
     assert acu.registers == (AZ_DEG, EL_DEG)
 
 
@@ -111,7 +107,7 @@ def test_a_sector_preference_left_by_somebody_is_freed_first() -> None:
     acu = SmallAcu(sector=2)
     assert start(standing(), acu).startup.stage is StartStage.READY
     assert acu.sector == 0
-    assert acu.asked.index(WriteParameter("S", 0)) < acu.asked.index(WriteRegisters(AZ_DEG, EL_DEG))
+    assert acu.asked.index(FreeTurnChoice()) < acu.asked.index(PointAt(AZ_DEG, EL_DEG))
 
 
 def test_disarmed_it_stops_before_the_first_write() -> None:
@@ -173,7 +169,7 @@ def test_registers_that_another_hand_changed_are_written_again() -> None:
     class Meddled(SmallAcu):
         def answer(self, command: Command) -> Reply:
             reply = super().answer(command)
-            if isinstance(command, WriteRegisters) and self.count == 1:
+            if isinstance(command, PointAt) and self.count == 1:
                 self.registers = (0.0, 0.0)
             return reply
 
@@ -192,16 +188,16 @@ def test_a_lost_reply_at_any_step_only_repeats_that_step(lost: int) -> None:
         exchange_count += 1
     assert state.startup.stage is StartStage.READY
     assert exchange_count <= 8
-    first_write = next(i for i, command in enumerate(acu.asked) if isinstance(command, WriteRegisters))
-    assert all(isinstance(command, (*READS, WriteParameter)) for command in acu.asked[:first_write])
+    first_write = next(i for i, command in enumerate(acu.asked) if isinstance(command, PointAt))
+    assert all(isinstance(command, (*READS, FreeTurnChoice)) for command in acu.asked[:first_write])
 
 
 def test_a_refused_write_never_counts_as_done() -> None:
     class Refusing(SmallAcu):
         def answer(self, command: Command) -> Reply:
-            if isinstance(command, WriteRegisters):
+            if isinstance(command, PointAt):
                 self.asked.append(command)
-                return Nak()
+                return Refused()
             return super().answer(command)
 
     assert start(standing(), Refusing()).startup.stage is StartStage.SECTOR_FREE
@@ -210,8 +206,8 @@ def test_a_refused_write_never_counts_as_done() -> None:
 def test_a_reply_to_another_question_moves_nothing() -> None:
     for stage in StartStage:
         state = remembering(standing(), stage=stage)
-        assert after_reply(state, Exchange(ReadParameter("A"), Parameter("A", 0)), NOW, CONFIG, []) == state
-        assert after_reply(state, Exchange(Identify(), Nak()), NOW, CONFIG, []) == state
+        assert after_reply(state, Exchange(ReadFaults(), TurnChoice(is_nearest=True)), NOW, CONFIG, []) == state
+        assert after_reply(state, Exchange(Identify(), Refused()), NOW, CONFIG, []) == state
 
 
 def test_when_it_is_ready_it_asks_for_nothing() -> None:
@@ -237,7 +233,7 @@ def test_a_rehearsal_gets_on_only_with_an_acu_that_surely_is_simulated(
 ) -> None:
     state, config = LATCHED, replace(CONFIG, is_rehearsal=True)
     for variant in identities:
-        state = after_reply(state, Exchange(Identify(), Identity("3842", variant)), NOW, config, [])
+        state = after_reply(state, Exchange(Identify(), field_reply(Identity("3842", variant))), NOW, config, [])
     assert state.startup.stage is stage
     wanted = Stop() if stage is StartStage.IDENTIFIED else None
     assert last_command(remembering(state, status=status()), config) == wanted

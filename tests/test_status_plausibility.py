@@ -20,8 +20,9 @@ from hypothesis import strategies as st
 from memories import Judge
 from promise_rig import Rig, demo_scene
 
-from acu_daemon.control.safety.status_plausibility import contradictions
-from acu_daemon.drivers.sa3842.messages import AcuMode, Backup, Command, SelectBackup, SelectMode, Status, Stow
+from acu_daemon.acu.commands import AcuMode, Backup, SelectBackup, SelectMode
+from acu_daemon.drivers.sa3842.field_status import contradictions, field_status
+from acu_daemon.drivers.sa3842.messages import Command, Status, Stow
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.scenario import AcuChoice, Scenario
@@ -41,7 +42,7 @@ HOLDING = Status(
 def told(*statuses: Status, apart_s: float = 0.1) -> list[bool]:
     """Which of them, one after another, are believed."""
     doubt = Judge(AZIMUTH, ELEVATION)
-    return [doubt.believes(status, 1000.0 + i * apart_s) for i, status in enumerate(statuses)]
+    return [doubt.believes(field_status(status), 1000.0 + i * apart_s) for i, status in enumerate(statuses)]
 
 
 @pytest.mark.parametrize("el_deg", [-5.0, 40.0, 140.0])
@@ -145,7 +146,7 @@ def test_p2_after_a_silence_a_place_is_sure_once_three_in_a_row_agree(
 ) -> None:
     doubt = Judge(AZIMUTH, ELEVATION)
     for i, status in enumerate(statuses):
-        doubt.believes(status, 1000.0 + i * apart_s)
+        doubt.believes(field_status(status), 1000.0 + i * apart_s)
     assert doubt.known.is_confirmed is is_confirmed
 
 

@@ -10,12 +10,13 @@ from promise_rig import Rig, demo_scene
 from test_safety import GUARDED, latched, moving
 from test_tick import FITTED, NOW, SKY, saw, status
 
+from acu_daemon.acu.commands import READS, AcuMode, Command, SetWatchdog, Stop
+from acu_daemon.acu.replies import AcuStatus, Refused, Reply
 from acu_daemon.cli.virtual_pass import ScriptAccess as Rigged
-from acu_daemon.control.safety.command_permit import READS
 from acu_daemon.control.state import ControlState, StartStage, Watchdog
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Exchange, Observation, Request, TickInput
-from acu_daemon.drivers.sa3842.messages import AcuMode, Command, Nak, Reply, Status, Stop, WriteParameter
+from acu_daemon.drivers.sa3842.messages import ReadParameter, ReadRegisters
 from acu_daemon.pointing.axis import AxisState
 
 T = RISING_TAI_S
@@ -59,7 +60,7 @@ def test_p1_armed_or_cleared_nothing_of_the_registers_before_is_gone_on_from(req
     assert (state.registers.axis_az, state.registers.axis_el, state.registers.was_followed) == (None, None, False)
 
 
-def extras(state: ControlState, seen: Status, reply: Reply | None) -> list[Command | None]:
+def extras(state: ControlState, seen: AcuStatus, reply: Reply | None) -> list[Command | None]:
     """Two seconds against an ACU that gives every extra exchange the same reply, or none."""
     sent: list[Command | None] = []
     extra = None
@@ -73,14 +74,14 @@ def extras(state: ControlState, seen: Status, reply: Reply | None) -> list[Comma
 
 
 def test_p6_a_stop_that_was_garbled_into_a_refusal_is_repeated_at_once() -> None:
-    assert extras(latched(), status(AcuMode.REMOTE), Nak()).count(Stop()) >= 5
+    assert extras(latched(), status(AcuMode.REMOTE), Refused()).count(Stop()) >= 5
 
 
 def test_the_register_watchdog_is_cleared_again_when_nobody_answered_but_not_for_ever_when_it_is_refused() -> None:
     disarmed = remembering(moving(), by_people=False, stage=StartStage.REGISTERS_KNOWN)
-    cleared = WriteParameter("W", 0)
+    cleared = SetWatchdog(0.0)
     assert extras(disarmed, status(AcuMode.STANDBY), None).count(cleared) >= 5
-    assert extras(disarmed, status(AcuMode.STANDBY), Nak()).count(cleared) == 1
+    assert extras(disarmed, status(AcuMode.STANDBY), Refused()).count(cleared) == 1
 
 
 @pytest.mark.parametrize("known", [Watchdog.SET, Watchdog.REFUSED])
@@ -142,7 +143,7 @@ def test_p1_a_latch_of_the_last_run_is_stopped_where_the_daemon_is_armed_and_els
         rig.wait(2.0)
         rig.end_and_run_again()
         rig.wait(1.0)
-    orders = [command for command in sent if not isinstance(command, READS)]
+    orders = [command for command in sent if not isinstance(command, (*READS, ReadRegisters, ReadParameter))]
     assert set(orders) == ({Stop()} if is_armed else set())
 
 

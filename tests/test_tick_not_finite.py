@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from memories import remembering
 from test_tick import CONFIG, FITTED, NOW, PLAN, ready, saw, status
 
+from acu_daemon.acu.commands import AcuMode, PointAndPoll, PointAt
 from acu_daemon.assist.session.refit import RefitReply, RefitRequest
 from acu_daemon.control.orders import Orders
 from acu_daemon.control.state import ControlState, PathOffset, StartStage
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Observation, Sky, TickInput
 from acu_daemon.control.tracking.state_table import TrackState
-from acu_daemon.drivers.sa3842.messages import AcuMode, WriteAndPoll, WriteRegisters
 from acu_daemon.edge.fit import InlineFitRunner
 from acu_daemon.model import Correction, FitResult, Model
 from acu_daemon.pointing.axis import AxisState
@@ -64,7 +64,7 @@ PLACES = [(name, path) for name, value in INPUTS.items() for path in places(valu
 
 def check(orders: Orders) -> None:
     for command in (orders.first, orders.extra):
-        if isinstance(command, WriteAndPoll | WriteRegisters):
+        if isinstance(command, PointAndPoll | PointAt):
             assert isfinite(command.az_deg) and isfinite(command.el_deg)
             assert -270.0 <= command.az_deg <= 270.0
             assert 0.0 <= command.el_deg <= 90.0
@@ -93,7 +93,7 @@ def test_p5_one_field_that_is_not_finite_never_raises_and_never_reaches_a_comman
 def test_p5_without_a_finite_time_it_polls(bad, track):
     state, orders = tick(memory(track, AcuMode.AUTOTRACK), TickInput(seen_in(AcuMode.AUTOTRACK), SKY, bad), CONFIG)
     check(orders)
-    assert not isinstance(orders.first, WriteAndPoll)
+    assert not isinstance(orders.first, PointAndPoll)
     assert state.refusals.refusal_count == 1
 
 
@@ -108,7 +108,7 @@ def test_p5_a_prediction_that_is_not_finite_is_refused_and_counted_and_the_last_
     assert state.refusals.refusal_count == 1
     assert [event.name for event in orders.events] == ["gate.refused"]
     state, orders = tick(state, TickInput(seen_in(mode), SKY, NOW + 0.2), CONFIG)
-    assert isinstance(orders.first, WriteAndPoll)
+    assert isinstance(orders.first, PointAndPoll)
     assert orders.first != first.first
 
 

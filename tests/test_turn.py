@@ -7,6 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from acu_daemon.acu.commands import AcuMode
+from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.control.safety.turn import (
     AGAINST_COUNT,
     BIT_SCORE,
@@ -23,7 +25,6 @@ from acu_daemon.control.safety.turn import (
     watch_goal,
     watch_pull,
 )
-from acu_daemon.drivers.sa3842.messages import AcuMode, Status
 from acu_daemon.model import AxisLimits
 
 WRAP = AxisLimits(-270.0, 270.0, 20.0, 10.0)
@@ -31,8 +32,8 @@ ONE_TURN = AxisLimits(0.0, 360.0, 20.0, 10.0)
 TICK_S = 0.1
 
 
-def seen(az_deg: float, bit: bool, **changes: bool) -> Status:
-    return replace(Status(az_deg % 360.0, 40.0, AcuMode.REMOTE, is_sector_high=bit), **changes)
+def seen(az_deg: float, bit: bool, **changes: bool) -> AcuStatus:
+    return replace(AcuStatus(az_deg % 360.0, 40.0, AcuMode.REMOTE, is_sector_high=bit), **changes)
 
 
 def follow(places_deg: list[float], bits: list[bool], limits: AxisLimits = WRAP) -> tuple[TurnWatch, list[float]]:

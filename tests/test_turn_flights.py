@@ -19,18 +19,9 @@ from flights import (
     worst_error_deg,
 )
 
+from acu_daemon.acu.commands import AcuMode, SelectMode, Stop
 from acu_daemon.cli.virtual_pass import Flight
-from acu_daemon.drivers.sa3842.messages import (
-    AcuMode,
-    Command,
-    Nak,
-    Reply,
-    SelectMode,
-    Status,
-    Stop,
-    WriteAndPoll,
-    WriteRegisters,
-)
+from acu_daemon.drivers.sa3842.messages import Command, Nak, Reply, Status, WriteAndPoll, WriteRegisters
 from acu_daemon.pointing.wrap import nearest_turn
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.scenario import AcuChoice

@@ -24,9 +24,10 @@ from flights import (
 )
 from real_pass import truth_path, truth_span, write_config
 
+from acu_daemon.acu.commands import Stop
 from acu_daemon.cli.options import Target, load_target
 from acu_daemon.cli.virtual_pass import Flight, fly
-from acu_daemon.drivers.sa3842.messages import Stop, WriteAndPoll, WriteParameter
+from acu_daemon.drivers.sa3842.messages import WriteAndPoll, WriteParameter
 from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.pointing.keyhole import KeyholeRules, SkyPath, follow_path

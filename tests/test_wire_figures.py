@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from fake_sky import AZIMUTH, ELEVATION, START_TAI_S, Bench
 
-from acu_daemon.drivers.sa3842.messages import Ack, AcuMode, Nak, SelectMode, WriteAndPoll, WriteRegisters
+from acu_daemon.acu.commands import AcuMode, SelectMode
+from acu_daemon.drivers.sa3842.angles import LSB_DEG
+from acu_daemon.drivers.sa3842.messages import Ack, Nak, WriteAndPoll, WriteRegisters
 from acu_daemon.errors import UsageError
 from acu_daemon.report.pass_trace import Trace
 from acu_daemon.report.wire import (
@@ -72,9 +74,9 @@ def test_a_wire_log_that_cannot_be_written_is_wrong_use(tmp_path: Path) -> None:
 
 def test_registers_are_judged_at_the_moment_they_take_effect() -> None:
     trace = steady()
-    on_time = measure_writes(writes_of(trace), trace, AZIMUTH, ELEVATION)
+    on_time = measure_writes(writes_of(trace), trace, AZIMUTH, ELEVATION, LSB_DEG)
     assert on_time.autotrack_max_deg == pytest.approx(0.0, abs=1e-4)
-    late = measure_writes(writes_of(trace, late_s=0.05), trace, AZIMUTH, ELEVATION)
+    late = measure_writes(writes_of(trace, late_s=0.05), trace, AZIMUTH, ELEVATION, LSB_DEG)
     assert late.autotrack_p99_deg == pytest.approx(0.05 * RATE_DEG_S * np.cos(np.radians(10.0)), abs=1e-3)
 
 
@@ -82,7 +84,7 @@ def test_the_first_ten_seconds_of_autotrack_are_not_judged() -> None:
     trace = steady()
     writes = writes_of(trace)
     writes.az_deg[:100] += 5.0
-    assert measure_writes(writes, trace, AZIMUTH, ELEVATION).autotrack_max_deg < 1e-3
+    assert measure_writes(writes, trace, AZIMUTH, ELEVATION, LSB_DEG).autotrack_max_deg < 1e-3
 
 
 def test_rhythm_of_the_writes() -> None:
@@ -91,7 +93,7 @@ def test_rhythm_of_the_writes() -> None:
     kept = np.arange(writes.tai_s.size) != 200  # one write is missing
     columns = (writes.tai_s, writes.az_deg, writes.el_deg)
     gappy = Writes(*(column[kept] for column in columns), writes.mode[1:], np.zeros(kept.size - 1))
-    figures = measure_writes(gappy, trace, AZIMUTH, ELEVATION)
+    figures = measure_writes(gappy, trace, AZIMUTH, ELEVATION, LSB_DEG)
     assert figures.longest_gap_s == pytest.approx(0.2, abs=1e-6)
     assert figures.share_of_short_gaps == pytest.approx(1 - 1 / (COUNT - 3), abs=1e-4)
     assert figures.writes_per_s == pytest.approx(10.0 * (COUNT - 3) / (COUNT - 2), abs=1e-3)
@@ -100,18 +102,18 @@ def test_rhythm_of_the_writes() -> None:
 def test_only_followed_registers_must_keep_to_the_rate_of_the_axis() -> None:
     trace = steady()
     writes = writes_of(trace)
-    assert measure_writes(writes, trace, AZIMUTH, ELEVATION).rate_share == 0.0
+    assert measure_writes(writes, trace, AZIMUTH, ELEVATION, LSB_DEG).rate_share == 0.0
     followed = replace(writes, is_followed=np.ones(writes.tai_s.size))
-    share = measure_writes(followed, trace, AZIMUTH, ELEVATION).rate_share
+    share = measure_writes(followed, trace, AZIMUTH, ELEVATION, LSB_DEG).rate_share
     assert share == pytest.approx(RATE_DEG_S / AZIMUTH.max_rate_deg_s, abs=0.01)
     followed.el_deg[300:] += 0.6
-    assert measure_writes(followed, trace, AZIMUTH, ELEVATION).rate_share > 1.0
+    assert measure_writes(followed, trace, AZIMUTH, ELEVATION, LSB_DEG).rate_share > 1.0
 
 
 def test_without_writes_in_autotrack_there_is_nothing_to_judge() -> None:
     trace = steady()
     with pytest.raises(ValueError, match="too few register writes"):
-        measure_writes(writes_of(trace, is_followed=True), trace, AZIMUTH, ELEVATION)
+        measure_writes(writes_of(trace, is_followed=True), trace, AZIMUTH, ELEVATION, LSB_DEG)
 
 
 def test_a_loss_is_judged_from_its_first_to_its_last_moment_and_the_relock_after_it() -> None:

@@ -10,12 +10,15 @@ from random import Random
 import numpy as np
 from fake_sky import START_TAI_S, Star
 
+from acu_daemon.acu.commands import AcuMode, Command, SelectMode, Stop
+from acu_daemon.acu.replies import AcuStatus, Refused, Reply
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.orders import Orders
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Request, Sky, TickInput
-from acu_daemon.drivers.sa3842.messages import AcuMode, Nak, SelectMode, Status, Stop, Stow
+from acu_daemon.drivers.sa3842.messages import Stow
+from acu_daemon.drivers.sa3842.sa3842_driver import field_reply, wire_command
 from acu_daemon.model import AxisLimits, Correction, FitResult, Model, Prediction, Reading
 from acu_daemon.pointing.envelope import Envelope
 from acu_daemon.sim.acu import FakeAcu
@@ -74,7 +77,7 @@ class Trouble:
     until_s: float = 7.0
     sign: int = 1
     begun_s: float = 0.0
-    held: Status | None = None
+    held: AcuStatus | None = None
 
 
 @dataclass
@@ -181,23 +184,26 @@ class TroubledDecision:
     def _observe(self, now_s: float) -> Observation:
         """Send what was ordered a tick ago, and see what comes back."""
         self.acu.advance(START_TAI_S + now_s - PERIOD_S + 0.02)
-        reply, extra, kind = self.acu.answer(self.orders.first), None, self.trouble.kind
+        reply, extra, kind = self._answer(self.orders.first), None, self.trouble.kind
         if self.orders.extra is not None:
-            extra = Exchange(self.orders.extra, self.acu.answer(self.orders.extra))
-        if kind == "silence" or not isinstance(reply, Status | Nak):
+            extra = Exchange(self.orders.extra, self._answer(self.orders.extra))
+        if kind == "silence" or not isinstance(reply, AcuStatus | Refused):
             self.silence_s = self.silence_s + PERIOD_S if kind == "silence" else 0.0
             extra = None if kind == "silence" else Exchange(self.orders.first, reply)
             return Observation(extra=extra, silence_s=self.silence_s, must_poll=kind == "silence")
         self.silence_s = 0.0
         requests = (Request.ARM, Request.CLEAR) if self.random.random() < 0.05 else ()
-        if kind == "nak" or isinstance(reply, Nak):
-            return Observation(extra=extra, refused=Nak(), requests=requests)
+        if kind == "nak" or isinstance(reply, Refused):
+            return Observation(extra=extra, refused=Refused(), requests=requests)
         status = self._troubled(reply, now_s)
         reading = Reading(START_TAI_S + now_s - PERIOD_S + 0.01, status.az_deg, status.el_deg, status.is_acquired)
         in_step, room = kind != "late", kind != "no room"
         return Observation(reading, status, is_in_step=in_step, extra=extra, requests=requests, has_room=room)
 
-    def _troubled(self, status: Status, now_s: float) -> Status:
+    def _answer(self, command: Command) -> Reply:
+        return field_reply(self.acu.answer(wire_command(command)))
+
+    def _troubled(self, status: AcuStatus, now_s: float) -> AcuStatus:
         trouble, since_s = self.trouble, now_s - self.trouble.begun_s - AXIS_AFTER_S
         if since_s < 0.0 and trouble.kind.endswith((" az", " el")):
             return status

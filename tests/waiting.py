@@ -14,6 +14,7 @@ from flights import WRONG_ORBIT, sky_of
 import acu_daemon.cli as cli
 import acu_daemon.cli.elements_watch as elements_watch_file
 import acu_daemon.edge.clock as clock_file
+from acu_daemon.acu.commands import Command
 from acu_daemon.cli.elements_watch import ElementsWatch
 from acu_daemon.cli.options import load_target
 from acu_daemon.cli.run import Prepared, RunSetup, prepare
@@ -22,7 +23,6 @@ from acu_daemon.daemon.runs import Runs
 from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.drivers.sa3842.codec import CommandEvent
-from acu_daemon.drivers.sa3842.messages import Command
 from acu_daemon.edge.clock import LoopClock, SystemClock
 from acu_daemon.edge.fit import InlineFitRunner
 from acu_daemon.errors import UsageError

@@ -13,6 +13,8 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from acu_daemon.acu.commands import AcuMode, Identify, ReadFaults
+from acu_daemon.acu.replies import AcuIdentity, AcuStatus, FaultReport, Reply
 from acu_daemon.cli.options import (
     NEXT_PASS_DAYS,
     Config,
@@ -27,15 +29,13 @@ from acu_daemon.cli.options import (
     parse_utc,
 )
 from acu_daemon.cli.own_daemon import OwnDaemon, find_daemon
-from acu_daemon.config.acu_tables import AcuSection
 from acu_daemon.config.load import load_station, satellite_names
 from acu_daemon.config.station_tables import StationFile
+from acu_daemon.config.to_settings import driver_of
 from acu_daemon.control.tracking.pass_plan import plan_pass
 from acu_daemon.daemon.health import status_line
 from acu_daemon.daemon.port import AcuPort
 from acu_daemon.daemon.verdict import Level, alarms, verdict
-from acu_daemon.drivers.sa3842.codec import address_byte
-from acu_daemon.drivers.sa3842.messages import AcuMode, Faults, Identify, Identity, ReadFaults, Reply, Status
 from acu_daemon.edge.clock import SystemClock, is_clock_synchronised, system_tai_s
 from acu_daemon.edge.clock_sense import before_elements, before_release
 from acu_daemon.edge.earth_orientation_file import at_date
@@ -130,7 +130,7 @@ def _findings(config: Path, satellite: str | None, now_tai_s: float, state: Path
         yield from _satellite(config, name, now_tai_s)
     try:
         link = make_link(station.acu.url)
-        check_rate(link, station.acu.period_s, station.acu.device_delay_s)
+        check_rate(link, driver_of(station), station.acu.period_s, station.acu.device_delay_s)
         yield Finding(GO, "line rate", f"{link.description} carries {1 / station.acu.period_s:g} writes a second")
     except UsageError as error:
         yield Finding(NO_GO, "line rate", str(error))
@@ -139,7 +139,7 @@ def _findings(config: Path, satellite: str | None, now_tai_s: float, state: Path
         yield _held(daemon)
         if daemon.seen is not None:
             return
-    for finding in run_loop(_acu, station.acu):
+    for finding in run_loop(_acu, station):
         if finding.verdict == NO_GO and "another client holds" in finding.detail:
             hint = "; if it is an acu-daemon, name its state directory with --state"
             yield replace(finding, verdict=WARN) if daemon else replace(finding, detail=finding.detail + hint)
@@ -310,15 +310,16 @@ def _next_pass(name: str, target: Target, now_tai_s: float) -> Iterator[Finding]
         yield Finding(WARN, f"{name}: approach", f"{why}: it may be late, `run` says by how much")
 
 
-async def _acu(acu: AcuSection) -> list[Finding]:
+async def _acu(station: StationFile) -> list[Finding]:
     """Ask identity, status and faults: nothing that moves or changes the ACU."""
+    acu = station.acu
     link, clock = make_link(acu.url), SystemClock()
-    port = AcuPort(link, clock, address_byte(acu.address), acu.period_s, acu.device_delay_s)
+    port = AcuPort(link, clock, driver_of(station), acu.period_s, acu.device_delay_s)
     try:
         await port.open(tries_all=True)
         async with asyncio.timeout(ACU_S):
             first = port.take_first()
-            status = first.reply if first and isinstance(first.reply, Status) else await port.status()
+            status = first.reply if first and isinstance(first.reply, AcuStatus) else await port.status()
             identity, faults = await port.reply_to(Identify()), await port.reply_to(ReadFaults())
     except LinkError as error:
         return [Finding(NO_GO, "ACU", str(error))]
@@ -336,8 +337,8 @@ async def _acu(acu: AcuSection) -> list[Finding]:
     return findings
 
 
-def _acu_findings(status: Status, identity: Reply, faults: Reply) -> Iterator[Finding]:
-    who = str(identity) if isinstance(identity, Identity) else "does not identify itself"
+def _acu_findings(status: AcuStatus, identity: Reply, faults: Reply) -> Iterator[Finding]:
+    who = str(identity) if isinstance(identity, AcuIdentity) else "does not identify itself"
     yield Finding(
         GO,
         "ACU",
@@ -347,7 +348,7 @@ def _acu_findings(status: Status, identity: Reply, faults: Reply) -> Iterator[Fi
         yield Finding(NO_GO, "ACU control", "the local panel has control: switch the ACU to REMOTE")
     else:
         yield Finding(GO, "ACU control", "remote control is enabled")
-    named = ", ".join(faults.texts()) if isinstance(faults, Faults) else ""
+    named = ", ".join(faults.texts) if isinstance(faults, FaultReport) else ""
     if status.mode is AcuMode.FAULT or named:
         yield Finding(NO_GO, "ACU faults", named or "mode FAULT")
     else:

@@ -16,6 +16,7 @@ from typing import Annotated, Any
 import structlog
 import typer
 
+from acu_daemon.acu.commands import AcuMode, Backup, SelectBackup, SelectMode
 from acu_daemon.cli.options import Target, coming_pass, load_target, whose_recording
 from acu_daemon.cli.run import make_job
 from acu_daemon.cli.simulated import station_air
@@ -23,8 +24,7 @@ from acu_daemon.daemon.live import LiveLine
 from acu_daemon.daemon.port import AcuPort
 from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.daemon.snapshot import Snapshot
-from acu_daemon.drivers.sa3842.codec import DEFAULT_ADDRESS
-from acu_daemon.drivers.sa3842.messages import AcuMode, Backup, SelectBackup, SelectMode
+from acu_daemon.drivers.sa3842.sa3842_driver import Sa3842Driver
 from acu_daemon.edge.child_process import start_python
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.event_loop import run_loop
@@ -198,7 +198,7 @@ def _beam_error_deg(seen: Snapshot, scenario: Scenario, sky: SimulatedSky) -> fl
 async def _rate_memory(url: str) -> None:
     """The rival: select rate memory and autotrack, then only look on."""
     link, clock = make_link(url), SystemClock()
-    port = AcuPort(link, clock, DEFAULT_ADDRESS, 0.1, 0.0)
+    port = AcuPort(link, clock, Sa3842Driver(), 0.1, 0.0)
     try:
         await port.open()
         for wanted in (SelectBackup(Backup.RATE), SelectMode(AcuMode.AUTOTRACK)):

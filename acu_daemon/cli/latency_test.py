@@ -10,6 +10,8 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from acu_daemon.acu.commands import Poll
+from acu_daemon.acu.driver import AcuDriver
 from acu_daemon.assist.session.refit import RefitRequest, RefitSetup
 from acu_daemon.cli.check import GO, NO_GO, WARN, Finding, clock_finding
 from acu_daemon.cli.options import check_duration, coming_pass, load_target
@@ -17,14 +19,13 @@ from acu_daemon.cli.outputs import refuse_no_picture, refuse_unwritable
 from acu_daemon.cli.run import make_job
 from acu_daemon.config.load import load_station
 from acu_daemon.config.station_tables import StationFile
+from acu_daemon.config.to_settings import driver_of
 from acu_daemon.daemon.latency_trial import Trial, try_loop
-from acu_daemon.daemon.port import CYCLE_SHARE, LONGEST_EXTRA, AcuPort
-from acu_daemon.drivers.sa3842.codec import address_byte, cycle_s, exchange_bytes
-from acu_daemon.drivers.sa3842.messages import Poll, WriteAndPoll
+from acu_daemon.daemon.port import CYCLE_SHARE, AcuPort
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.event_loop import run_loop
 from acu_daemon.edge.fit import ProcessFitRunner
-from acu_daemon.edge.link import Link, make_link
+from acu_daemon.edge.link import Link, cycle_s, make_link
 from acu_daemon.edge.scheduling import keep_to_this_thread, may_be_real_time
 from acu_daemon.errors import UsageError
 from acu_daemon.model import Pass, Readings
@@ -56,7 +57,7 @@ def command(
     """Measure whether this machine and this link keep the daemon's time.  Moves nothing.
 
     Runs the daemon's own clock and loop, ten ticks a second, with a fit each second in the child process.  With
-    --config the ACU is sent STATUS POLL (31h) at each tick, and nothing else; a daemon that holds it must be stopped
+    --config the ACU is asked for its status at each tick, and told nothing; a daemon that holds it must be stopped
     first.  Do it on the machine and with the load of the site, for ten minutes or more:
 
       acu-daemon latency-test --config config --duration 600
@@ -105,8 +106,7 @@ async def _measure(station: StationFile | None, link: Link | None, duration_s: f
     period_s = PERIOD_S if station is None else station.acu.period_s
     acu = None
     if station is not None and link is not None:
-        address = address_byte(station.acu.address)
-        acu = link, AcuPort(link, clock, address, period_s, station.acu.device_delay_s)
+        acu = link, AcuPort(link, clock, driver_of(station), period_s, station.acu.device_delay_s)
     setup, coming = _made_up_pass()
     try:
         return await try_loop(
@@ -173,10 +173,11 @@ def _link(trial: Trial, station: StationFile | None, link: Link | None) -> Itera
     if station is None or link is None:
         yield Finding(SKIP, "link", "no --config: no ACU is known")
         return
+    driver = driver_of(station)
     if trial.link_problem or not trial.round_trips_s:
         verdict = NO_GO if trial.late else SKIP
         yield Finding(verdict, "link", "; ".join(trial.link_problem.splitlines()) or "no poll was answered")
-        yield fits(link, station.acu.period_s, station.acu.device_delay_s, "as configured")
+        yield fits(link, driver, station.acu.period_s, station.acu.device_delay_s, "as configured")
         return
     trips_ms = np.sort(1e3 * np.array(trial.round_trips_s))
     p50_ms, p99_ms = (trips_ms[int(share * (trips_ms.size - 1))] for share in (0.5, 0.99))
@@ -187,17 +188,19 @@ def _link(trial: Trial, station: StationFile | None, link: Link | None) -> Itera
     lost_share = trial.lost_poll_count / asked_count
     verdict = NO_GO if lost_share > LOST_SHARE else WARN if lost_share else GO
     yield Finding(verdict, "link", detail + (": look at cable, ground and baud rate" if lost_share else ""))
-    wire_s = sum(exchange_bytes(Poll())) * link.byte_time_s
-    yield fits(link, station.acu.period_s, max(0.0, p99_ms / 1e3 - wire_s), "measured")
+    wire_s = driver.wire_bytes(Poll()) * link.byte_time_s
+    yield fits(link, driver, station.acu.period_s, max(0.0, p99_ms / 1e3 - wire_s), "measured")
 
 
-def fits(link: Link, period_s: float, latency_s: float, source: str) -> Finding:
-    """Whether a register write each period fits with this latency, and one beside it (docs/protocol.md, Timing)."""
+def fits(link: Link, driver: AcuDriver, period_s: float, latency_s: float, source: str) -> Finding:
+    """Whether a write each period fits with this latency, and one beside it (docs/adding-an-acu.md, Timing)."""
     allowed_ms = 1e3 * CYCLE_SHARE * period_s
-    one_s = cycle_s((WriteAndPoll(0.0, 0.0),), link.byte_time_s, latency_s)
-    one_ms, both_ms = 1e3 * one_s, 1e3 * (one_s + (LONGEST_EXTRA + 1) * link.byte_time_s + latency_s)
+    one_s = cycle_s(driver, link.byte_time_s, latency_s)
+    one_ms, both_ms = 1e3 * one_s, 1e3 * (one_s + (driver.extra_bytes + 1) * link.byte_time_s + latency_s)
     baud = f"{round(10.0 / link.byte_time_s)} baud" if link.byte_time_s else "no baud rate in the URL"
-    detail = f"{baud}, latency {1e3 * latency_s:.1f} ms {source}: WRITE AND STATUS {one_ms:.1f} of {allowed_ms:g} ms"
+    detail = (
+        f"{baud}, latency {1e3 * latency_s:.1f} ms {source}: a command and its status {one_ms:.1f} of {allowed_ms:g} ms"
+    )
     if one_ms > allowed_ms:
         return Finding(NO_GO, "cycle", f"{detail}: use a higher baud rate or a longer period")
     if both_ms > allowed_ms:

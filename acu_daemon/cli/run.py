@@ -39,7 +39,7 @@ from acu_daemon.cli.options import (
 from acu_daemon.cli.rehearsal import clock_text, meet_in_rehearsal, met_by_chance
 from acu_daemon.cli.weather_watch import WeatherWatch
 from acu_daemon.config.load import load_station
-from acu_daemon.config.to_settings import control_config, estimator_settings
+from acu_daemon.config.to_settings import control_config, driver_of, estimator_settings
 from acu_daemon.control.state import ControlState
 from acu_daemon.daemon.background import fit_deadline_s
 from acu_daemon.daemon.health import Health
@@ -47,7 +47,6 @@ from acu_daemon.daemon.live import LiveLine
 from acu_daemon.daemon.runs import Runs
 from acu_daemon.daemon.service import Outcome, PassJob, Service
 from acu_daemon.daemon.snapshot import Snapshot
-from acu_daemon.drivers.sa3842.codec import address_byte
 from acu_daemon.edge.clock import STEP_S, SystemClock
 from acu_daemon.edge.control_socket import ControlSocket
 from acu_daemon.edge.denied import denied
@@ -148,7 +147,7 @@ def command(
         coming_pass(target, clock.tai_s())
         _tell_clock(met if clock.is_rehearsal else met_by_chance(target.station.acu.url, clock), clock)
         link = make_link(target.station.acu.url)
-        check_rate(link, target.station.acu.period_s, target.station.acu.device_delay_s)
+        check_rate(link, driver_of(target.station), target.station.acu.period_s, target.station.acu.device_delay_s)
         base = state_directory(state, is_rehearsal=clock.is_rehearsal)
         antenna = antenna_of(target.station)
         directory = antenna_directory(base, antenna)
@@ -253,6 +252,7 @@ def make_job(
 ) -> PassJob:
     """What the files say, as the daemon needs it."""
     station = target.station
+    driver = driver_of(station)
     return PassJob(
         refit=RefitSetup(
             target.elements.propagator,
@@ -263,11 +263,11 @@ def make_job(
             carried=carried,
             zenith_objective=station.tracking.zenith_objective,
         ),
-        control=replace(control_config(station, target.satellite, link.byte_time_s), is_rehearsal=is_rehearsal),
+        control=replace(control_config(station, target.satellite, driver, link.byte_time_s), is_rehearsal=is_rehearsal),
         coming=coming,
         horizon_s=station.tracking.horizon_s,
         low_water_s=station.tracking.low_water_s,
-        address=address_byte(station.acu.address),
+        driver=driver,
         device_delay_s=station.acu.device_delay_s,
         is_rehearsal=is_rehearsal,
         end_tai_s=end_tai_s,

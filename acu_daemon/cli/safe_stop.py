@@ -12,9 +12,9 @@ import typer
 from acu_daemon.cli.options import Config
 from acu_daemon.config.load import load_station
 from acu_daemon.config.station_tables import StationFile
+from acu_daemon.config.to_settings import driver_of
 from acu_daemon.daemon.port import AcuPort
 from acu_daemon.daemon.stopping import DEADLINE_S, stop_antenna
-from acu_daemon.drivers.sa3842.codec import address_byte
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.event_loop import run_loop
 from acu_daemon.edge.link import make_link
@@ -68,7 +68,7 @@ async def _stop(station: StationFile) -> bool:
     clock = SystemClock()
     configure_logs(clock.tai_s, tags={}, is_terminal=sys.stdout.isatty())
     acu = station.acu
-    port = AcuPort(make_link(acu.url), clock, address_byte(acu.address), acu.period_s, acu.device_delay_s)
+    port = AcuPort(make_link(acu.url), clock, driver_of(station), acu.period_s, acu.device_delay_s)
     begun_s, keeper = clock.monotonic_s(), asyncio.create_task(port.keep())
     try:
         async with asyncio.timeout(DEADLINE_S):

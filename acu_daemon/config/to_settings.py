@@ -2,26 +2,32 @@
 
 from math import hypot
 
+from acu_daemon.acu.driver import AcuDriver
 from acu_daemon.assist.estimators.estimator import EstimatorSettings
 from acu_daemon.assist.settings import StateSigmas
 from acu_daemon.config.satellite_tables import SatelliteFile, UncertaintySection
 from acu_daemon.config.station_tables import StationFile
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.axis_watch import Bounds
+from acu_daemon.drivers.dialects import DriverSettings, make_driver
 
-HALF_SERVO_TICK_S = 0.010  # a command waits for half a 50 Hz servo tick on average: docs/protocol.md, Servo
+
+def driver_of(station: StationFile) -> AcuDriver:
+    """The driver of the station's ACU, at the beginning of its dialogue."""
+    return make_driver(station.acu.dialect, DriverSettings(station.acu.address, station.acu.device_delay_s))
 
 
-def control_config(station: StationFile, satellite: SatelliteFile, byte_time_s: float) -> ControlConfig:
+def control_config(
+    station: StationFile, satellite: SatelliteFile, driver: AcuDriver, byte_time_s: float
+) -> ControlConfig:
     """What the decision of a tick needs; byte_time_s is the wire time of one character (0 on TCP)."""
-    acu = station.acu
-    wire_s = 17 * byte_time_s  # a WRITE AND STATUS command: docs/protocol.md, Messages
+    acu, timing = station.acu, driver.timing(byte_time_s)
     return ControlConfig(
         envelope=station.bounds,
         period_s=acu.period_s,
-        sample_delay_s=wire_s + acu.device_delay_s,
-        poll_sample_delay_s=5 * byte_time_s + acu.device_delay_s,
-        effect_delay_s=wire_s + acu.device_delay_s + HALF_SERVO_TICK_S,
+        sample_delay_s=timing.sample_delay_s,
+        poll_sample_delay_s=timing.poll_sample_delay_s,
+        effect_delay_s=timing.effect_delay_s,
         beamwidth_deg=station.receiver.beamwidth_deg,
         lock_dwell_s=station.receiver.lock_dwell_s,
         min_elevation_deg=station.station.min_elevation_deg,
@@ -32,7 +38,8 @@ def control_config(station: StationFile, satellite: SatelliteFile, byte_time_s: 
         search_along_s=station.tracking.search_along_s,
         search_across_deg=station.tracking.search_across_deg,
         is_armed=station.safety.arm == "auto",
-        register_watchdog_s=station.safety.register_watchdog_s,
+        register_watchdog_s=station.safety.register_watchdog_s if driver.capabilities.has_register_watchdog else 0.0,
+        acu=driver.capabilities,
         clock_alarm_deg=station.safety.clock_alarm_beam_fraction * station.receiver.beamwidth_deg,
         following=Bounds(station.safety.following_error_deg, station.safety.following_error_s),
     )

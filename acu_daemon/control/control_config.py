@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from acu_daemon.acu.capabilities import Capabilities
 from acu_daemon.control.safety.axis_watch import Bounds
 from acu_daemon.model import AxisLimits
 from acu_daemon.pointing.envelope import Envelope
@@ -13,9 +14,9 @@ class ControlConfig:
 
     envelope: Envelope
     period_s: float = 0.1
-    sample_delay_s: float = 0.010  # start of WRITE AND STATUS to the sample of the angles: docs/protocol.md, Time tags
-    poll_sample_delay_s: float = 0.010  # the same for STATUS POLL
-    effect_delay_s: float = 0.020  # start of a write to its effect: docs/protocol.md, Time tags
+    sample_delay_s: float = 0.010  # from the start of a write that brings the status to the sample of its angles
+    poll_sample_delay_s: float = 0.010  # the same for a poll
+    effect_delay_s: float = 0.020  # start of a write to its effect
     beamwidth_deg: float = 1.0
     lock_dwell_s: float = 1.0
     min_elevation_deg: float = 5.0
@@ -28,8 +29,9 @@ class ControlConfig:
     is_armed: bool = True  # at the start; later as people arm and disarm
     is_shadow: bool = False  # commands nothing, whatever happens
     is_rehearsal: bool = False  # commands nothing but an ACU that says it is simulated
-    register_watchdog_s: float = 0.0  # the ACU's parameter W; 0: it is not touched
+    register_watchdog_s: float = 0.0  # what the ACU's is set to; 0: it is not touched
     following: Bounds = Bounds()
+    acu: Capabilities = Capabilities()
     clock_alarm_deg: float = 0.1  # an error of UTC counts from here on, at the sky's present rate
 
     @property

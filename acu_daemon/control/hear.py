@@ -6,6 +6,8 @@ Observation for the next one; the fit is given its readings at once.
 
 from dataclasses import dataclass, replace
 
+from acu_daemon.acu.commands import PointAndPoll, Poll
+from acu_daemon.acu.replies import AcuStatus, Refused
 from acu_daemon.assist.reading_gate import acquired_since_tai_s
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.status_plausibility import judge
@@ -13,7 +15,6 @@ from acu_daemon.control.state import ControlState, Fitting
 from acu_daemon.control.tick_input import Arrival, Exchange, Observation
 from acu_daemon.control.tracking.causes import is_acquired
 from acu_daemon.control.tracking.state_table import AUTOTRACKING
-from acu_daemon.drivers.sa3842.messages import Nak, Poll, Status, WriteAndPoll
 from acu_daemon.model import Reading
 
 ROUNDING_S = 1e-6  # of differences of TAI
@@ -32,18 +33,18 @@ class Heard:
 def hear(state: ControlState, seen: Observation, arrival: Arrival, config: ControlConfig) -> tuple[ControlState, Heard]:
     """Take a reply in.  seen: what was heard before it since the last tick."""
     command, reply = arrival.command, arrival.reply
-    if isinstance(reply, Status):
+    if isinstance(reply, AcuStatus):
         return _hear_status(state, seen, arrival, reply, config)
-    if not isinstance(command, WriteAndPoll | Poll):
+    if not isinstance(command, PointAndPoll | Poll):
         return state, Heard(replace(seen, extra=Exchange(command, reply)))
-    return state, Heard(replace(seen, refused=reply) if isinstance(reply, Nak) else seen)
+    return state, Heard(replace(seen, refused=reply) if isinstance(reply, Refused) else seen)
 
 
 def _hear_status(
-    state: ControlState, seen: Observation, arrival: Arrival, status: Status, config: ControlConfig
+    state: ControlState, seen: Observation, arrival: Arrival, status: AcuStatus, config: ControlConfig
 ) -> tuple[ControlState, Heard]:
     tai_s = _sample_tai_s(arrival, config)
-    plausibility = judge(state.plausibility, status, tai_s, config.azimuth, config.elevation)
+    plausibility = judge(state.plausibility, status, tai_s, config.azimuth, config.elevation, config.acu.silence_s)
     if not plausibility.is_believed:
         return replace(state, plausibility=plausibility), Heard(seen, doubt=plausibility.reason)
     reading = Reading(tai_s, status.az_deg, status.el_deg, is_acquired(status), status.agc_db)

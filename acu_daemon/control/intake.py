@@ -2,20 +2,21 @@
 
 from dataclasses import replace
 
+from acu_daemon.acu.commands import AcuMode
+from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.control.orders import Event
 from acu_daemon.control.safety.encoder_watch import EncoderWatch, watch_encoders
 from acu_daemon.control.state import ControlState, Intake
 from acu_daemon.control.tick_input import Sky, TickInput
 from acu_daemon.control.tracking.causes import is_acquired
 from acu_daemon.control.tracking.state_table import AUTOTRACKING
-from acu_daemon.drivers.sa3842.messages import AcuMode, Status
 from acu_daemon.model import Reading
 
 RATE_READINGS = 6  # the rate of an axis is taken over this many readings: near the zenith one pair is all noise
 
 
 def take_status(
-    state: ControlState, status: Status, reading: Reading, az_deg: float, given: TickInput, events: list[Event]
+    state: ControlState, status: AcuStatus, reading: Reading, az_deg: float, given: TickInput, events: list[Event]
 ) -> ControlState:
     """Remember a status and its reading, and watch the encoders.  az_deg: where the azimuth is, continuous."""
     before = state.intake
@@ -31,7 +32,7 @@ def take_status(
     return replace(state, intake=intake, encoders=encoders)
 
 
-def _is_stow_kept(state: ControlState, status: Status) -> bool:
+def _is_stow_kept(state: ControlState, status: AcuStatus) -> bool:
     """A stow that began after the start is somebody's wish; an antenna found stowed at the start is ours to take."""
     before = state.intake
     if status.mode is AcuMode.STOWED:
@@ -52,7 +53,7 @@ def doubt_place(state: ControlState) -> ControlState:
     return replace(state, intake=replace(state.intake, is_place_sure=False))
 
 
-def _watched(state: ControlState, status: Status, reading: Reading, sky: Sky, events: list[Event]) -> EncoderWatch:
+def _watched(state: ControlState, status: AcuStatus, reading: Reading, sky: Sky, events: list[Event]) -> EncoderWatch:
     """Watch for frozen encoders while autotrack holds the satellite."""
     is_ours = is_acquired(status) and state.tracking.track in AUTOTRACKING
     path = sky.prediction.at(reading.tai_s) if sky.prediction and is_ours else None

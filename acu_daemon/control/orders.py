@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from acu_daemon.drivers.sa3842.messages import Command
+from acu_daemon.acu.commands import Command
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,12 +6,12 @@ Owner of `Registers` and `Refusals`.
 import math
 from dataclasses import replace
 
+from acu_daemon.acu.commands import PointAndPoll
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.orders import Event
 from acu_daemon.control.state import ControlState, Sent
 from acu_daemon.control.tick_input import Observation
 from acu_daemon.control.tracking.register_limiter import Passed, limit, within_limits
-from acu_daemon.drivers.sa3842.messages import WriteAndPoll
 from acu_daemon.model import Pointing
 
 REFUSED_PAUSE_S = 1.0  # a write that is refused again within REFUSED_AGAIN_S waits this long
@@ -97,7 +97,7 @@ def count_refusals(state: ControlState, count: int) -> ControlState:
 
 def write(
     state: ControlState, wanted: Pointing, now_tai_s: float, config: ControlConfig, events: list[Event]
-) -> tuple[ControlState, WriteAndPoll]:
+) -> tuple[ControlState, PointAndPoll]:
     """Make the register write for a wanted pointing, as near to it as limits and drives allow."""
     registers, status = state.registers, state.intake.status
     is_followed = status is not None and status.follows_registers
@@ -158,7 +158,7 @@ def _sent(
     *,
     is_followed: bool,
     goal_az_deg: float | None,
-) -> tuple[ControlState, WriteAndPoll]:
+) -> tuple[ControlState, PointAndPoll]:
     registers, az_deg, el_deg = state.registers, passed.az.position_deg, passed.el.position_deg
     is_calm = (
         abs(passed.az.rate_deg_s) < CALM_SHARE * config.azimuth.max_rate_deg_s
@@ -178,7 +178,7 @@ def _sent(
         commands=(*registers.commands[-2:], Sent(az_deg, el_deg, is_free)),
         goal_az_deg=goal_az_deg,
     )
-    return replace(state, registers=registers), WriteAndPoll(az_deg, el_deg, state.startup.tilt_code)
+    return replace(state, registers=registers), PointAndPoll(az_deg, el_deg)
 
 
 def note_as_if_written(state: ControlState, written: ControlState) -> ControlState:

@@ -1,41 +1,36 @@
-"""The order of a start, and of a fresh start after the link was lost (docs/protocol.md, The order of a start).
+"""The order of a start, and of a fresh start after the link was lost (docs/adding-an-acu.md, The start).
 
-Poll, identify, read the registers (for the tilt), free the sector preference, write the present angles, read them back.
+Poll, identify, read the registers, free the choice of the turn, write the present angles, read them back.
 Only then is a path written or a mode selected, and the register watchdog set.  Disarmed, it stops before the first
-write.  An ACU that refuses to have its parameters read or written is taken as it is, with a warning.
+write.  What an ACU has not (`Capabilities`) is left out; one that refuses to have its choice of the turn or its
+watchdog read or written is taken as it is, with a warning.
 
 Owner of `Startup`.
 """
 
 from dataclasses import replace
 
+from acu_daemon.acu.angle_steps import clamp_to_step
+from acu_daemon.acu.commands import (
+    Backup,
+    Command,
+    FreeTurnChoice,
+    Identify,
+    PointAt,
+    ReadCommanded,
+    ReadTurnChoice,
+    ReadWatchdog,
+    SelectBackup,
+    SetWatchdog,
+    Stop,
+)
+from acu_daemon.acu.replies import AcuIdentity, AcuStatus, Commanded, Done, Refused, TurnChoice, WatchdogTime
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.orders import Event
 from acu_daemon.control.state import ControlState, StartStage, Startup, Watchdog
 from acu_daemon.control.tick_input import Exchange
-from acu_daemon.drivers.sa3842.angles import LSB_DEG, clamp_deg
-from acu_daemon.drivers.sa3842.messages import (
-    Ack,
-    Backup,
-    Command,
-    Identify,
-    Identity,
-    Nak,
-    Parameter,
-    ReadParameter,
-    ReadRegisters,
-    RegisterContents,
-    SelectBackup,
-    Status,
-    Stop,
-    WriteParameter,
-    WriteRegisters,
-)
 from acu_daemon.units import wrap_180
 
-SECTOR = "S"  # the ACU's sector preference; 0: a register is followed the nearest way (docs/protocol.md, Parameters)
-WATCHDOG = "W"  # the ACU's register watchdog: unwritten registers that are followed put it in STANDBY
-WATCHDOG_LSB_S = 0.02  # docs/protocol.md, Parameters
 WATCHDOG_TRY_S = 2.0  # without the answer that is hoped for, and the ACU counts as having no watchdog
 
 
@@ -45,24 +40,22 @@ def next_command(state: ControlState, config: ControlConfig) -> Command | None:
     if startup.stage is StartStage.NEW:
         return Identify()
     if startup.stage is StartStage.IDENTIFIED:
-        return ReadRegisters()
+        return ReadCommanded()
     if state.latch.problem or not state.is_armed(config) or status is None or not status.is_remote_enabled:
         return None
     if startup.stage is StartStage.REGISTERS_KNOWN:
-        return WriteParameter(SECTOR, 0) if asked == ReadParameter(SECTOR) else ReadParameter(SECTOR)
+        return FreeTurnChoice() if asked == ReadTurnChoice() else ReadTurnChoice()
     if startup.stage is StartStage.SECTOR_FREE:
-        return WriteRegisters(*_present(state, config)) if state.intake.is_place_sure else None
+        return PointAt(*_present(state, config)) if state.intake.is_place_sure else None
     if startup.stage is StartStage.PRESENT_WRITTEN:
-        return ReadRegisters()
+        return ReadCommanded()
     if config.register_watchdog_s > 0.0 and startup.watchdog is Watchdog.UNKNOWN:
-        if asked == ReadParameter(WATCHDOG):
-            return WriteParameter(WATCHDOG, watchdog_code(config))
-        return ReadParameter(WATCHDOG)
+        return SetWatchdog(config.register_watchdog_s) if asked == ReadWatchdog() else ReadWatchdog()
     return None
 
 
 def begin_again(state: ControlState, *, keeps_watchdog: bool) -> ControlState:
-    """Free the sector preference and write the present angles again; who the ACU is, is known.
+    """Free the choice of the turn and write the present angles again; who the ACU is, is known.
 
     keeps_watchdog: it stays as it is set.  Else it is set again, but where the ACU has none.
     """
@@ -79,7 +72,7 @@ def begin_after_lost_link(state: ControlState) -> ControlState:
     return replace(state, startup=startup)
 
 
-def watch_for_power_cycle(state: ControlState, status: Status) -> ControlState:
+def watch_for_power_cycle(state: ControlState, status: AcuStatus) -> ControlState:
     """A backup that changed by itself shows a power cycle.
 
     Then the registers, the tilt among them, are read again, and the watchdog is off.
@@ -96,19 +89,15 @@ def _unset(startup: Startup) -> Watchdog:
     return Watchdog.UNKNOWN if startup.watchdog is Watchdog.SET else startup.watchdog
 
 
-def watchdog_code(config: ControlConfig) -> int:
-    """Code of the register watchdog's time."""
-    return round(config.register_watchdog_s / WATCHDOG_LSB_S)
-
-
 def _present(state: ControlState, config: ControlConfig) -> tuple[float, float]:
-    """Where the ends of the range have one bearing, within a code of it that bearing: both ends are it, and reached."""
+    """Where the ends of the range have one bearing, within a step of it that bearing: both ends are it, and reached."""
     az_deg, ends_deg = state.intake.az_deg, (config.azimuth.min_deg, config.azimuth.max_deg)
-    if abs(ends_deg[1] - ends_deg[0] - 360.0) < LSB_DEG:
-        az_deg = next((end for end in ends_deg if abs(az_deg - end) <= 1.01 * LSB_DEG), az_deg)
+    step_deg = config.acu.angle_step_deg
+    if abs(ends_deg[1] - ends_deg[0] - 360.0) < step_deg:
+        az_deg = next((end for end in ends_deg if abs(az_deg - end) <= 1.01 * step_deg), az_deg)
     return (
-        clamp_deg(az_deg, *ends_deg),
-        clamp_deg(state.intake.el_deg, config.elevation.min_deg, config.elevation.max_deg),
+        clamp_to_step(az_deg, *ends_deg, step_deg),
+        clamp_to_step(state.intake.el_deg, config.elevation.min_deg, config.elevation.max_deg, step_deg),
     )
 
 
@@ -117,36 +106,40 @@ def after_reply(
 ) -> ControlState:
     """Advance by the reply of an extra exchange; a missing or unexpected reply leaves the stage as it is."""
     startup, command, reply = state.startup, extra.command, extra.reply
-    is_refused = isinstance(reply, Nak) and state.intake.status is not None and state.intake.status.is_remote_enabled
+    is_refused = (
+        isinstance(reply, Refused) and state.intake.status is not None and state.intake.status.is_remote_enabled
+    )
     match (startup.stage, command, reply):
-        case (_, Stop(), Ack()):
+        case (_, Stop(), Done()):
             startup = replace(startup, watchdog=_perhaps_set(startup, config))
-        case (_, ReadParameter("W") | WriteParameter("W"), _):
+        case (_, ReadWatchdog() | SetWatchdog(), _):
             startup = _after_watchdog(startup, extra, now_tai_s, config, events, is_refused=is_refused)
-        case (StartStage.READY, SelectBackup(), Ack()) if startup.watchdog is Watchdog.SET:
+        case (StartStage.READY, SelectBackup(), Done()) if startup.watchdog is Watchdog.SET:
             startup = replace(startup, watchdog=Watchdog.UNKNOWN)  # a backup to select may come from a power cycle
-        case (StartStage.NEW, Identify(), Identity() as identity):
+        case (StartStage.NEW, Identify(), AcuIdentity() as identity):
             startup = _identified(startup, identity, config, events)
-        case (StartStage.IDENTIFIED, ReadRegisters(), RegisterContents(tilt_code=tilt_code)):
-            startup = replace(startup, stage=StartStage.REGISTERS_KNOWN, tilt_code=tilt_code)
-        case (StartStage.REGISTERS_KNOWN, ReadParameter("S"), Parameter(code=0)) | (
+        case (StartStage.IDENTIFIED, ReadCommanded(), Commanded()):
+            startup = replace(startup, stage=StartStage.REGISTERS_KNOWN)
+        case (StartStage.REGISTERS_KNOWN, ReadTurnChoice(), TurnChoice(is_nearest=True)) | (
             StartStage.REGISTERS_KNOWN,
-            WriteParameter("S"),
-            Ack(),
+            FreeTurnChoice(),
+            Done(),
         ):
             startup = replace(startup, stage=StartStage.SECTOR_FREE)
-        case (StartStage.REGISTERS_KNOWN, WriteParameter("S"), Nak()) if is_refused:
-            advice = "the antenna may turn the long way round: set the ACU's parameter S to 0 by hand"
+        case (StartStage.REGISTERS_KNOWN, FreeTurnChoice(), Refused()) if is_refused:
+            advice = "the antenna may turn the long way round: let the ACU follow a bearing on the nearest turn"
             events.append(Event("acu.sector_refused", {"advice": advice}, is_warning=True))
             startup = replace(startup, stage=StartStage.SECTOR_FREE)
-        case (StartStage.SECTOR_FREE, WriteRegisters() as written, Ack()):
+        case (StartStage.SECTOR_FREE, PointAt() as written, Done()):
             startup = replace(startup, stage=StartStage.PRESENT_WRITTEN, present_deg=(written.az_deg, written.el_deg))
-        case (StartStage.PRESENT_WRITTEN, ReadRegisters(), RegisterContents() as read):
-            startup = replace(startup, stage=StartStage.READY if _matches(startup, read) else StartStage.SECTOR_FREE)
+        case (StartStage.PRESENT_WRITTEN, ReadCommanded(), Commanded() as read):
+            startup = replace(
+                startup, stage=StartStage.READY if _matches(startup, read, config) else StartStage.SECTOR_FREE
+            )
     return state if startup is state.startup else replace(state, startup=startup)
 
 
-def _identified(startup: Startup, identity: Identity, config: ControlConfig, events: list[Event]) -> Startup:
+def _identified(startup: Startup, identity: AcuIdentity, config: ControlConfig, events: list[Event]) -> Startup:
     """One that nobody knows may be a garbled one: it is asked again.  A rehearsal on a real ACU gets no further."""
     is_sure = identity.is_known or identity == startup.identity
     if not is_sure:
@@ -172,10 +165,10 @@ def _after_watchdog(
     is_refused: bool,
 ) -> Startup:
     """The watchdog counts as set when it was read back; a clean stop has written 0."""
-    if extra.command == WriteParameter(WATCHDOG, 0):
-        is_done = is_refused or isinstance(extra.reply, Ack)
+    if extra.command == SetWatchdog(0.0):
+        is_done = is_refused or isinstance(extra.reply, Done)
         return replace(startup, watchdog=Watchdog.UNKNOWN) if is_done else startup
-    if extra.reply == Parameter(WATCHDOG, watchdog_code(config)):
+    if isinstance(extra.reply, WatchdogTime) and _is_as_wanted(extra.reply, config):
         return replace(startup, watchdog=Watchdog.SET, watchdog_from_tai_s=None)
     from_tai_s = now_tai_s if startup.watchdog_from_tai_s is None else startup.watchdog_from_tai_s
     if is_refused or now_tai_s - from_tai_s >= WATCHDOG_TRY_S:
@@ -185,8 +178,12 @@ def _after_watchdog(
     return replace(startup, watchdog_from_tai_s=from_tai_s)
 
 
-def _matches(startup: Startup, read: RegisterContents) -> bool:
+def _is_as_wanted(read: WatchdogTime, config: ControlConfig) -> bool:
+    return abs(read.after_s - config.register_watchdog_s) <= 0.501 * config.acu.watchdog_step_s
+
+
+def _matches(startup: Startup, read: Commanded, config: ControlConfig) -> bool:
     if startup.present_deg is None:
         return False
-    az_deg, el_deg = startup.present_deg
-    return abs(wrap_180(read.az_deg - az_deg)) < LSB_DEG and abs(read.el_deg - el_deg) < LSB_DEG
+    (az_deg, el_deg), step_deg = startup.present_deg, config.acu.angle_step_deg
+    return abs(wrap_180(read.az_deg - az_deg)) < step_deg and abs(read.el_deg - el_deg) < step_deg

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from math import inf
 
+from acu_daemon.acu.commands import Command
+from acu_daemon.acu.replies import AcuIdentity, AcuStatus
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.axis_watch import AxesWatch
 from acu_daemon.control.safety.encoder_watch import EncoderWatch
@@ -16,7 +18,6 @@ from acu_daemon.control.safety.status_plausibility import Plausibility
 from acu_daemon.control.safety.turn import TurnWatch
 from acu_daemon.control.tracking.lag import LagEstimate
 from acu_daemon.control.tracking.state_table import TrackState
-from acu_daemon.drivers.sa3842.messages import Command, Identity, Status
 from acu_daemon.model import Model, Reading
 from acu_daemon.pointing.axis import AxisState
 
@@ -44,7 +45,7 @@ class StartStage(IntEnum):
 class Intake:
     """The newest status and where it shows the antenna.  Owner: control.intake."""
 
-    status: Status | None = None
+    status: AcuStatus | None = None
     reading: Reading | None = None
     is_place_sure: bool = False  # the newest statuses agree where the antenna is
     az_deg: float = 0.0  # encoder azimuth of the newest status, in the frame of the wrap (continuous)
@@ -72,9 +73,8 @@ class Startup:
     """How far the start has come, and what it learned of the ACU.  Owner: control.startup."""
 
     stage: StartStage = StartStage.NEW
-    identity: Identity | None = None  # as the ACU said it last
+    identity: AcuIdentity | None = None  # as the ACU said it last
     is_identity_sure: bool = False  # a known one, or said twice
-    tilt_code: int = 0
     present_deg: tuple[float, float] | None = None  # the first register write of this start, to be read back
     watchdog: Watchdog = Watchdog.UNKNOWN
     watchdog_from_tai_s: float | None = None  # since when it is tried to set it
@@ -93,7 +93,7 @@ class Arming:
 class Held:
     """The antenna as the daemon had it last, in a mode that follows it or autotracks."""
 
-    has_interlock_fault: bool = False  # n5.b3: the bit with which the ACU's register watchdog shows
+    has_interlock_fault: bool = False  # the bit with which the ACU's register watchdog shows
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,12 +101,12 @@ class ForeignStop:
     """The antenna that the daemon holds until another hand's STOP.  Owner: control.safety.foreign_stop."""
 
     held: Held | None = None  # None: it does not hold the antenna; kept through lost links and restarts
-    is_doubted: bool = False  # found in STANDBY, by a hand or by the register watchdog: FAULT DETAIL tells
+    is_doubted: bool = False  # found in STANDBY, by a hand or by the register watchdog: the ACU is asked
 
 
 @dataclass(frozen=True, slots=True)
 class Interlock:
-    """What FAULT DETAIL was asked for.  Owner: control.safety.interlock."""
+    """What the ACU was asked of its faults.  Owner: control.safety.interlock."""
 
     faults_read: tuple[bool, ...] | None = None  # the fault bits of the status whose detail was read, while in FAULT
 

@@ -7,6 +7,7 @@ control.state is its memory, control.tracking.state_table the table.
 
 import math
 
+from acu_daemon.acu.commands import Poll
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.extra_exchange import needs_no_poll, note_asked, wait_after_refusal, wanted_extra
 from acu_daemon.control.intake import take_status
@@ -34,7 +35,6 @@ from acu_daemon.control.tracking.path_offset import drop_unusable_offset, forget
 from acu_daemon.control.tracking.search import search
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.control.tracking.walk import walk
-from acu_daemon.drivers.sa3842.messages import Poll
 
 
 def tick(state: ControlState, given: TickInput, config: ControlConfig) -> tuple[ControlState, Orders]:
@@ -67,7 +67,7 @@ def take_in(state: ControlState, given: TickInput, config: ControlConfig, events
         state = take_refusal(state, now_tai_s, events)
     if status is not None and reading is not None:
         state, az_deg = locate_azimuth(take_in_force(state, seen), status, reading, config, events)
-        state = learn_lag(state, az_deg, status.el_deg) if seen.is_in_step else state
+        state = learn_lag(state, az_deg, status.el_deg, config) if seen.is_in_step else state
         state = watch_for_power_cycle(state, status)
         state = take_status(state, status, reading, az_deg, given, events)
     if extra is not None:

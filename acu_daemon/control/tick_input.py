@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
-from acu_daemon.drivers.sa3842.messages import Command, Nak, Reply, Status
+from acu_daemon.acu.commands import Command
+from acu_daemon.acu.replies import AcuStatus, Refused, Reply
 from acu_daemon.model import FitResult, Prediction, Reading
 from acu_daemon.pointing.reach import OutOfReach
 
@@ -43,15 +44,17 @@ class Observation:
     """What the last tick brought."""
 
     reading: Reading | None = None  # with the status it came from; None: no good reply to the last write or poll
-    status: Status | None = None
+    status: AcuStatus | None = None
     is_confirmed: bool = True  # the place in the status, by those before it
     is_in_step: bool = True  # the reply is sure to be to this exchange: the reading's time is right
     extra: Exchange | None = None
-    refused: Nak | None = None  # the ACU refused the register write
+    refused: Refused | None = None  # the ACU refused the register write
     silence_s: float = 0.0
-    must_poll: bool = False  # the last exchange failed: the next command is a poll (docs/protocol.md, Late replies)
+    must_poll: bool = (
+        False  # the last exchange failed: the next command is a poll (docs/adding-an-acu.md, Late replies)
+    )
     requests: tuple[Request, ...] = ()
-    has_room: bool = True  # the cycle leaves room for an exchange beside the write (docs/protocol.md, Timing)
+    has_room: bool = True  # the cycle leaves room for an exchange beside the write (docs/adding-an-acu.md, Timing)
 
 
 @dataclass(frozen=True, slots=True)

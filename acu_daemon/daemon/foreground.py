@@ -7,6 +7,18 @@ from typing import Any
 
 import structlog
 
+from acu_daemon.acu.commands import (
+    Command,
+    FreeTurnChoice,
+    PointAndPoll,
+    PointAt,
+    Poll,
+    SelectBackup,
+    SelectMode,
+    SetWatchdog,
+    command_text,
+)
+from acu_daemon.acu.replies import AcuIdentity, AcuStatus, Done, FaultReport, Refused
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.hear import hear
 from acu_daemon.control.orders import Event
@@ -14,7 +26,6 @@ from acu_daemon.control.safety.arming import owes_stop
 from acu_daemon.control.state import StartStage, Watchdog
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Arrival, Observation, Request, TickInput
-from acu_daemon.control.tracking.causes import LINK_SILENCE_S
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.clock_watch import ClockWatch
 from acu_daemon.daemon.line_watch import LineWatch
@@ -22,21 +33,6 @@ from acu_daemon.daemon.motion import Motion
 from acu_daemon.daemon.port import AcuPort, Answer
 from acu_daemon.daemon.stopping import DEADLINE_S, stop_antenna
 from acu_daemon.daemon.tick_lateness import Lateness
-from acu_daemon.drivers.sa3842.messages import (
-    Ack,
-    Command,
-    Faults,
-    Identity,
-    Nak,
-    Poll,
-    SelectBackup,
-    SelectMode,
-    Status,
-    WriteAndPoll,
-    WriteParameter,
-    WriteRegisters,
-    command_text,
-)
 from acu_daemon.edge.clock import Clock
 from acu_daemon.model import Reading
 
@@ -72,7 +68,7 @@ class Foreground:
         self._connect_count = 0
         self._status_s = -math.inf  # when the newest status came, believed or not, or was refused
         self._log: Any = structlog.get_logger("tick")
-        self.identity: Identity | None = None
+        self.identity: AcuIdentity | None = None
         self.acu_faults = ""  # as the ACU named them last
         self.tick_count = 0
         self.write_count = 0
@@ -124,7 +120,7 @@ class Foreground:
         """Whether the start can go on: its last question is answered, or the first status of all has come."""
         if self._seen.extra is None:
             return self._seen.status is not None and self._area.state.intake.status is None
-        return not isinstance(self._seen.extra.reply, Nak | None)
+        return not isinstance(self._seen.extra.reply, Refused | None)
 
     def _next_s(self, begun_tai_s: float) -> float:
         """How long the next decision's exchanges take: one of the start's alone as long as the last, else the most."""
@@ -134,9 +130,9 @@ class Foreground:
 
     async def _tick(self) -> None:
         port, area = self._port, self._area
-        port.drop_if_silent(LINK_SILENCE_S)
+        port.drop_if_silent()
         first = port.take_first()
-        if first is not None and isinstance(first.reply, Status):
+        if first is not None and isinstance(first.reply, AcuStatus):
             self._status_s = self._clock.monotonic_s()
             self._hear(Poll(), first)
         requests, self._requests = self._requests, ()
@@ -173,17 +169,17 @@ class Foreground:
         return self._port.silence_s if self._port.is_up and not is_another and not is_blind else math.inf
 
     async def _do(self, command: Command) -> bool:
-        """One exchange; what it brings is gathered for the next decision.  A NAK is followed by a poll at once.
+        """One exchange; what it brings is gathered for the next decision.  A refusal is followed by a poll at once.
 
         True: a reply came, be it a refusal.
         """
         answer = await self._port.exchange(command)
-        if isinstance(command, WriteAndPoll | Poll) and answer.reply is not None:
+        if isinstance(command, PointAndPoll | Poll) and answer.reply is not None:
             self._status_s = self._clock.monotonic_s()
-        if isinstance(command, WriteAndPoll) and isinstance(answer.reply, Status):
+        if isinstance(command, PointAndPoll) and isinstance(answer.reply, AcuStatus):
             self.write_count += 1
         self._hear(command, answer)
-        if isinstance(answer.reply, Nak):
+        if isinstance(answer.reply, Refused):
             await self._poll_after_nak(command)
         return answer.reply is not None
 
@@ -200,7 +196,7 @@ class Foreground:
         self._log.warning("acu.nak", command=command_text(refused))
         await self._port.idle_gap()
         answer = await self._port.exchange(Poll())
-        if isinstance(answer.reply, Status):
+        if isinstance(answer.reply, AcuStatus):
             self._hear(Poll(), answer)
 
     def _hear(self, command: Command, answer: Answer) -> None:
@@ -211,7 +207,7 @@ class Foreground:
         if heard.seen.extra is not self._seen.extra:
             self._report_extra(command, answer)
         self._seen = heard.seen
-        if heard.doubt and isinstance(answer.reply, Status):
+        if heard.doubt and isinstance(answer.reply, AcuStatus):
             self._report_doubt(answer.reply, heard.doubt)
         if heard.reading is None:
             return
@@ -221,7 +217,7 @@ class Foreground:
         if self._on_reading is not None and answer.is_sure:
             self._on_reading(heard.reading)
 
-    def _report_doubt(self, status: Status, reason: str) -> None:
+    def _report_doubt(self, status: AcuStatus, reason: str) -> None:
         """Say it once a second at most: a bad line garbles often."""
         now_s = self._clock.monotonic_s()
         if now_s >= self._doubt_again_s:
@@ -234,14 +230,14 @@ class Foreground:
             (self._log.warning if event.is_warning else self._log.info)(event.name, **event.fields)
 
     def _report_extra(self, command: Command, answer: Answer) -> None:
-        if isinstance(answer.reply, Identity):
+        if isinstance(answer.reply, AcuIdentity):
             self.identity = answer.reply
             self._log.info("acu.identified", identity=str(answer.reply), is_simulation=answer.reply.is_simulated)
-        elif isinstance(answer.reply, Faults):
-            self.acu_faults = ", ".join(answer.reply.texts())
-            self._log.warning("acu.faults", faults=answer.reply.texts())
-        elif isinstance(command, SelectMode | SelectBackup | WriteParameter | WriteRegisters) and isinstance(
-            answer.reply, Ack
+        elif isinstance(answer.reply, FaultReport):
+            self.acu_faults = ", ".join(answer.reply.texts)
+            self._log.warning("acu.faults", faults=answer.reply.texts)
+        elif isinstance(command, SelectMode | SelectBackup | FreeTurnChoice | SetWatchdog | PointAt) and isinstance(
+            answer.reply, Done
         ):
             self._log.info("acu.command", command=command_text(command))
 

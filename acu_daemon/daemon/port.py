@@ -1,4 +1,4 @@
-"""One exchange after another with the ACU, and the connection kept alive beside them (docs/protocol.md, Link)."""
+"""One exchange after another with the ACU, and the connection kept alive beside them; its driver knows the bytes."""
 
 import asyncio
 import contextlib
@@ -9,23 +9,20 @@ from typing import Any
 
 import structlog
 
-from acu_daemon.control.tracking.causes import LINK_SILENCE_S
-from acu_daemon.drivers.sa3842.codec import exchange_bytes, reply_bytes
-from acu_daemon.drivers.sa3842.exchange import HostExchange
-from acu_daemon.drivers.sa3842.messages import Command, Identity, Poll, Reply, Status, WriteAndPoll
+from acu_daemon.acu.commands import Command, PointAndPoll, Poll
+from acu_daemon.acu.driver import AcuDriver
+from acu_daemon.acu.replies import AcuIdentity, AcuStatus, Reply
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.link import Link, open_once
 from acu_daemon.errors import LinkError
 
-EXCHANGE_DEADLINE_S = 0.090  # a reply is complete within this of the start of the write: docs/protocol.md, Link
-CYCLE_SHARE = 0.95  # of the period, for a write and an exchange beside it: docs/protocol.md, Timing
+CYCLE_SHARE = 0.95  # of the period, for a write and an exchange beside it
 FIRST_BACK_OFF_S = 0.1
 FIRST_POLL_S = 0.6  # so long an open link is asked for its first answer: all four questions, and the poll once more
 LAST_BACK_OFF_S = 1.0  # a pass is short: more than a second of waiting costs more than an attempt
 SHORTEST_WAIT_S = 0.001
 LATENCY_COUNT = 100
 LATE_STEP_MS = 50
-LONGEST_EXTRA = 18  # bytes of the longest housekeeping exchange that goes beside a write: docs/protocol.md, Timing
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,15 +41,16 @@ class Answer:
 class AcuPort:
     """The ACU as the foreground sees it.  Owned by the foreground; `keep` runs as its own task."""
 
-    def __init__(self, link: Link, clock: Clock, address: int, period_s: float, device_delay_s: float) -> None:
+    def __init__(self, link: Link, clock: Clock, driver: AcuDriver, period_s: float, device_delay_s: float) -> None:
         self._link = link
         self._clock = clock
-        self._address = address
-        self._exchange = HostExchange(address)
+        self._driver = driver
+        self._deadline_s = driver.capabilities.reply_deadline_s
         self._period_s = period_s
         self._latencies_s = array("d", [device_delay_s] * LATENCY_COUNT)  # of the newest exchanges, in no order
         self._latency_count = 0
-        self._both_count = sum(exchange_bytes(WriteAndPoll(0.0, 0.0))) + 1 + LONGEST_EXTRA + 1  # with an idle byte each
+        both_count = driver.wire_bytes(PointAndPoll(0.0, 0.0)) + 1 + driver.extra_bytes + 1  # with an idle byte each
+        self._both_s = both_count * link.byte_time_s
         self._log: Any = structlog.get_logger("link")
         self._reopen = asyncio.Event()
         self._up = asyncio.Event()
@@ -73,7 +71,7 @@ class AcuPort:
 
     @property
     def must_poll(self) -> bool:
-        return self._exchange.must_poll
+        return self._driver.must_poll
 
     @property
     def silence_s(self) -> float:
@@ -82,32 +80,32 @@ class AcuPort:
 
     @property
     def discarded_count(self) -> int:
-        return self._exchange.discarded_count
+        return self._driver.discarded_count
 
     @property
     def garbled_count(self) -> int:
-        return self._exchange.garbled_count
+        return self._driver.garbled_count
 
     @property
     def late_count(self) -> int:
         """Replies that came, but after their deadline."""
-        return self._exchange.late_count
+        return self._driver.late_count
 
     @property
     def lateness(self) -> str:
         """How late the newest late reply was, for people, in steps so that they are not told of each one."""
-        late_ms = LATE_STEP_MS * math.ceil(1e3 * self._exchange.late_s / LATE_STEP_MS)
-        return f"up to {late_ms} ms after the command, {1e3 * EXCHANGE_DEADLINE_S:.0f} are allowed"
+        late_ms = LATE_STEP_MS * math.ceil(1e3 * self._driver.late_s / LATE_STEP_MS)
+        return f"up to {late_ms} ms after the command, {1e3 * self._deadline_s:.0f} are allowed"
 
     @property
     def has_room(self) -> bool:
-        """Whether the computed cycle leaves room for a second exchange beside the write (docs/protocol.md, Timing)."""
+        """Whether the computed cycle leaves room for a second exchange beside the write."""
         return self.both_s <= CYCLE_SHARE * self._period_s
 
     @property
     def both_s(self) -> float:
         """Computed time of a write and the longest exchange beside it."""
-        return self._both_count * self._link.byte_time_s + 2 * max(self._latencies_s)
+        return self._both_s + 2 * max(self._latencies_s)
 
     async def exchange(self, command: Command) -> Answer:
         """Send a command and wait for its reply until the deadline; a dead link is reported and reopened by `keep`."""
@@ -116,52 +114,52 @@ class AcuPort:
         reply: Reply | None = None
         try:
             if unread := self._link.drain_input():
-                self._exchange.receive(unread, started_s)
-            frame = self._exchange.begin(command, started_s)
-            wire_s = (len(frame) + reply_bytes(command)) * self._link.byte_time_s
+                self._driver.receive(unread, started_s)
+            frame = self._driver.begin(command, started_s)
+            wire_s = self._driver.wire_bytes(command) * self._link.byte_time_s
             self._link.write(frame)
-            until_s = asyncio.get_running_loop().time() + EXCHANGE_DEADLINE_S
+            until_s = asyncio.get_running_loop().time() + self._deadline_s
             with contextlib.suppress(TimeoutError):
                 while reply is None:
                     data, arrival_s = await self._link.read(until_s)
                     first_byte_s = arrival_s if first_byte_s is None else first_byte_s
-                    reply = self._exchange.receive(data, arrival_s)
+                    reply = self._driver.receive(data, arrival_s)
         except LinkError as error:
             self.problem = self._broken = str(error)
             self._drop(str(error))
         if reply is None:
-            self._exchange.fail(self._clock.monotonic_s())
+            self._driver.fail(self._clock.monotonic_s())
             self.failed_exchange_count += 1
             return Answer(None, started_tai_s, None)
         ended_s = self._clock.monotonic_s()
-        if not isinstance(reply, Identity) or reply.is_known:  # an identity is free text: another may be garble
+        if not isinstance(reply, AcuIdentity) or reply.is_known:  # an identity is free text: another may be garble
             self.last_reply_s = ended_s
         self._latencies_s[self._latency_count % LATENCY_COUNT] = max(0.0, ended_s - started_s - wire_s)
         self._latency_count += 1
         first_byte_tai_s = None if first_byte_s is None else started_tai_s + first_byte_s - started_s
-        return Answer(reply, started_tai_s, first_byte_tai_s, self._exchange.is_sure)
+        return Answer(reply, started_tai_s, first_byte_tai_s, self._driver.is_sure)
 
     def question(self) -> Command | None:
-        """A poll, or what may stand in its place; None: nothing may yet (docs/protocol.md, Late replies)."""
-        return self._exchange.question(self._clock.monotonic_s())
+        """A poll, or what may stand in its place; None: nothing may yet."""
+        return self._driver.question(self._clock.monotonic_s())
 
     async def ask(self) -> Answer | None:
         """Poll, or do what must come before that: another question, or a pause until one may be asked; then None."""
         question = self.question()
         if question is None:
-            await asyncio.sleep(self._exchange.free_s - self._clock.monotonic_s() + SHORTEST_WAIT_S)
+            await asyncio.sleep(self._driver.free_s - self._clock.monotonic_s() + SHORTEST_WAIT_S)
             return None
         answer = await self.exchange(question)
         await self.idle_gap()
         return answer if isinstance(question, Poll) else None
 
-    async def status(self) -> Status:
+    async def status(self) -> AcuStatus:
         """Ask until a status has come, over as many connections as it takes; whoever calls sets the deadline."""
         while True:
             await self.wait_until_up()
-            self.drop_if_silent(LINK_SILENCE_S)
+            self.drop_if_silent()
             answer = await self.ask() if self.is_up else None
-            if answer is not None and isinstance(answer.reply, Status):
+            if answer is not None and isinstance(answer.reply, AcuStatus):
                 return answer.reply
 
     async def reply_to(self, command: Command) -> Reply:
@@ -175,14 +173,14 @@ class AcuPort:
                 return answer.reply
 
     async def idle_gap(self) -> None:
-        """Leave 10 idle bit times before the next command (docs/protocol.md, Link)."""
+        """Leave 10 idle bit times before the next command."""
         if self._link.byte_time_s > 0:
             await asyncio.sleep(self._link.byte_time_s)
 
-    def drop_if_silent(self, limit_s: float) -> None:
-        """Close and reopen a link without a valid reply for this long, so that no unsent write arrives as a burst."""
-        if self.is_up and self.silence_s > limit_s:
-            late = f"; they come {self.lateness}" if self._exchange.late_at_s > self.last_reply_s else ""
+    def drop_if_silent(self) -> None:
+        """Close and reopen a link without a valid reply for long, so that no unsent write arrives as a burst."""
+        if self.is_up and self.silence_s > self._driver.capabilities.silence_s:
+            late = f"; they come {self.lateness}" if self._driver.late_at_s > self.last_reply_s else ""
             self._drop(f"no valid reply for {self.silence_s:.1f} s{late}")
 
     def _drop(self, problem: str) -> None:
@@ -208,7 +206,7 @@ class AcuPort:
                     self.attempt_count += 1
                     await self._link.close()
                     await asyncio.sleep(pause_s)
-                    is_there = self._exchange.late_at_s > opened_s
+                    is_there = self._driver.late_at_s > opened_s
                     pause_s = FIRST_BACK_OFF_S if is_there else min(2 * pause_s, LAST_BACK_OFF_S)
                     continue
                 pause_s, reported = FIRST_BACK_OFF_S, ""
@@ -237,7 +235,7 @@ class AcuPort:
         self._up.set()
 
     async def _first_poll(self) -> Answer:
-        self._broken, late_count = "", self._exchange.late_count
+        self._broken, late_count = "", self._driver.late_count
         end_s = asyncio.get_running_loop().time() + FIRST_POLL_S
         while asyncio.get_running_loop().time() < end_s:
             answer = await self.ask()
@@ -245,7 +243,7 @@ class AcuPort:
                 return answer
             if self._broken:
                 raise LinkError(self._broken)
-        if self._exchange.late_count > late_count:
+        if self._driver.late_count > late_count:
             raise LinkError(f"{self._link.description} is open, but all replies come too late: {self.lateness}")
         raise LinkError(f"{self._link.description} is open, but no ACU answers: check address and baud rate")
 
@@ -256,5 +254,5 @@ class AcuPort:
 
     def abandon(self) -> None:
         """Give up an exchange whose waiter was cancelled, so that the next one starts clean."""
-        if self._exchange.is_outstanding:
-            self._exchange.fail(self._clock.monotonic_s())
+        if self._driver.is_outstanding:
+            self._driver.fail(self._clock.monotonic_s())

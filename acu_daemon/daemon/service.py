@@ -8,6 +8,7 @@ from typing import Any
 
 import structlog
 
+from acu_daemon.acu.driver import AcuDriver
 from acu_daemon.assist.session.refit import RefitSetup
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.arming import begin_run
@@ -42,7 +43,7 @@ class PassJob:
     coming: Pass
     horizon_s: float
     low_water_s: float
-    address: int
+    driver: AcuDriver
     device_delay_s: float
     is_rehearsal: bool = False
     end_tai_s: float = math.inf  # of --duration
@@ -116,7 +117,7 @@ class Service:
         self._started_tai_s = math.inf
         self._log: Any = structlog.get_logger("pass")
         self._area = CommonArea(state=begin_run(job.state, job.control))
-        self._port = AcuPort(link, clock, job.address, job.control.period_s, job.device_delay_s)
+        self._port = AcuPort(link, clock, job.driver, job.control.period_s, job.device_delay_s)
         self._background = Background(
             self._area,
             runner,

@@ -5,10 +5,10 @@ from typing import Any
 
 import structlog
 
+from acu_daemon.acu.commands import SetWatchdog, Stop
+from acu_daemon.acu.replies import AcuStatus, Done
 from acu_daemon.control.safety.arming import NO_STOP_MODES
-from acu_daemon.control.startup import WATCHDOG
 from acu_daemon.daemon.port import AcuPort
-from acu_daemon.drivers.sa3842.messages import Ack, Status, Stop, WriteParameter
 
 DEADLINE_S = 5.0  # a link that is down may come back; the service's TimeoutStopSec is longer
 REPEAT_S = 0.1
@@ -28,7 +28,7 @@ async def stop_antenna(port: AcuPort, deadline_s: float, *, clears_watchdog: boo
             status = await _stopped(port)
             is_stopped = True
             if clears_watchdog and status.is_remote_enabled:
-                await port.reply_to(WriteParameter(WATCHDOG, 0))
+                await port.reply_to(SetWatchdog(0.0))
     except TimeoutError:
         if not is_stopped:
             why = port.problem or "the ACU does not acknowledge it"
@@ -36,7 +36,7 @@ async def stop_antenna(port: AcuPort, deadline_s: float, *, clears_watchdog: boo
     return is_stopped
 
 
-async def _stopped(port: AcuPort) -> Status:
+async def _stopped(port: AcuPort) -> AcuStatus:
     """Return the last status before the STOP that was acknowledged, or one that forbids it."""
     log: Any = structlog.get_logger("stop")
     while True:
@@ -46,7 +46,7 @@ async def _stopped(port: AcuPort) -> Status:
             return status
         answer = await port.exchange(Stop())
         await port.idle_gap()
-        if isinstance(answer.reply, Ack):
+        if isinstance(answer.reply, Done):
             log.info("stop.done")
             return status
         await asyncio.sleep(REPEAT_S)

@@ -1,4 +1,4 @@
-"""The seam between the daemon and the ACU's bytes, and the choice of the link by its URL (docs/protocol.md, Link)."""
+"""The seam between the daemon and the ACU's bytes, and the choice of the link by its URL (docs/configuration.md)."""
 
 import math
 import time
@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Protocol
 from urllib.parse import SplitResult, parse_qsl, urlsplit
 
-from acu_daemon.drivers.sa3842.codec import cycle_s, exchange_bytes
-from acu_daemon.drivers.sa3842.messages import WriteAndPoll
+from acu_daemon.acu.commands import PointAndPoll
+from acu_daemon.acu.driver import AcuDriver
 from acu_daemon.edge.serial_port import CHARACTER_FORMATS, SerialLink
 from acu_daemon.edge.tcp import TcpLink
 from acu_daemon.errors import LinkError, UsageError
@@ -15,7 +15,7 @@ from acu_daemon.errors import LinkError, UsageError
 BITS_PER_CHARACTER = 10  # start, 8N1 or 7E1, stop
 DEFAULT_BAUD = 9600
 BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
-CYCLE_SHARE = 0.95  # of the period: docs/protocol.md, Timing
+CYCLE_SHARE = 0.95  # of the period: docs/adding-an-acu.md, Timing
 EXPECTED = "expected tcp://HOST:PORT, tcp://HOST:PORT?baud=9600 or serial:///dev/ttyUSB0?baud=9600&format=8N1"
 
 
@@ -80,19 +80,23 @@ async def open_once(link: Link) -> None:
                 raise
 
 
-def check_rate(link: Link, period_s: float, device_delay_s: float) -> None:
-    """Check that WRITE AND STATUS fits the period (docs/protocol.md, Timing).  UsageError: no, with the arithmetic."""
-    command = WriteAndPoll(0.0, 0.0)
-    needed_s = cycle_s((command,), link.byte_time_s, device_delay_s)
+def cycle_s(driver: AcuDriver, byte_time_s: float, latency_s: float) -> float:
+    """Time of the normal cycle: angles are commanded and the status comes, an idle character, and the latency."""
+    return (driver.wire_bytes(PointAndPoll(0.0, 0.0)) + 1) * byte_time_s + latency_s
+
+
+def check_rate(link: Link, driver: AcuDriver, period_s: float, device_delay_s: float) -> None:
+    """Check that the normal cycle fits the period.  UsageError: no, with the arithmetic."""
+    needed_s = cycle_s(driver, link.byte_time_s, device_delay_s)
     allowed_s = CYCLE_SHARE * period_s
     if needed_s <= allowed_s:
         return
-    character_count = sum(exchange_bytes(command)) + 1
-    fastest_s = cycle_s((command,), BITS_PER_CHARACTER / max(BAUD_RATES), device_delay_s)
+    character_count = driver.wire_bytes(PointAndPoll(0.0, 0.0)) + 1
+    fastest_s = cycle_s(driver, BITS_PER_CHARACTER / max(BAUD_RATES), device_delay_s)
     advice = "use a higher baud rate or a longer period" if fastest_s <= allowed_s else "use a longer period"
     raise UsageError(
-        f"{link.description} cannot carry a WRITE AND STATUS every {period_s * 1e3:g} ms: {character_count} characters"
-        f" of {link.byte_time_s * 1e3:.3f} ms and {device_delay_s * 1e3:g} ms of device delay"
+        f"{link.description} cannot carry a command and its status every {period_s * 1e3:g} ms: {character_count}"
+        f" characters of {link.byte_time_s * 1e3:.3f} ms and {device_delay_s * 1e3:g} ms of device delay"
         f" make {needed_s * 1e3:.1f} ms, and only {allowed_s * 1e3:g} ms (95 % of the period) are allowed; {advice}"
     )
 

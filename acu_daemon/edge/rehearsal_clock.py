@@ -4,7 +4,7 @@ Whoever starts first has the clock: `--at` holds at the start of that process.  
 it where its own --at says the same; so either may be stopped and started again in mid-rehearsal.  The file, in the
 user's runtime directory, is locked as long as its process lives: what a dead one left counts for nothing.  A line with
 faults between the two (`fault-proxy`) leaves the place it leads to instead.  The wire carries no clock
-(docs/protocol.md, Time tags), so a simulator of another hand has none to give.
+(docs/testing.md), so a simulator of another hand has none to give.
 """
 
 import contextlib

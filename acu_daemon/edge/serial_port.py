@@ -1,4 +1,4 @@
-"""The ACU's bytes over a serial line: RS-232 or RS-422, or a pseudo terminal (docs/protocol.md, Link)."""
+"""The ACU's bytes over a serial line: RS-232 or RS-422, or a pseudo terminal."""
 
 import asyncio
 import contextlib

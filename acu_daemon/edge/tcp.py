@@ -1,4 +1,4 @@
-"""The ACU's bytes over TCP (docs/protocol.md, Link)."""
+"""The ACU's bytes over TCP."""
 
 import asyncio
 import contextlib

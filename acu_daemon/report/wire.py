@@ -7,14 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from acu_daemon.drivers.sa3842.angles import LSB_DEG
 from acu_daemon.model import AxisLimits, sky_angle_deg
 from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.pointing.axis import AxisState, step
 from acu_daemon.report.pass_trace import Trace
 from acu_daemon.units import Array, wrap_180
 
-HALF_SERVO_TICK_S = 0.010  # docs/protocol.md, Time tags: a write waits for half a servo tick on average
+HALF_SERVO_TICK_S = 0.010  # a write waits for half a servo tick on average
 PERIOD_S = 0.100  # of the writes; one that comes soon after a late one was still meant for its own tick
 LONG_GAP_S = 0.120
 SETTLE_S = 10.0  # registers count this long after autotrack began
@@ -58,8 +57,10 @@ class WriteFigures:
     autotrack_p99_deg: float
 
 
-def measure_writes(writes: Writes, trace: Trace, azimuth: AxisLimits, elevation: AxisLimits) -> WriteFigures:
-    """Sum up the writes of a pass.  ValueError: there are none to judge."""
+def measure_writes(
+    writes: Writes, trace: Trace, azimuth: AxisLimits, elevation: AxisLimits, angle_step_deg: float
+) -> WriteFigures:
+    """Sum up the writes of a pass; the ACU carries angles in steps.  ValueError: there are none to judge."""
     gaps_s = np.diff(writes.tai_s)
     aim_deg = _autotrack_errors_deg(writes, trace)
     if gaps_s.size == 0 or aim_deg.size == 0:
@@ -69,14 +70,14 @@ def measure_writes(writes: Writes, trace: Trace, azimuth: AxisLimits, elevation:
         writes_per_s=float(gaps_s.size / gaps_s.sum()),
         share_of_short_gaps=float(np.mean(gaps_s <= LONG_GAP_S)),
         longest_gap_s=float(gaps_s.max()),
-        rate_share=_rate_share(writes, azimuth, elevation),
+        rate_share=_rate_share(writes, azimuth, elevation, angle_step_deg),
         autotrack_max_deg=float(aim_deg.max()),
         autotrack_p99_deg=float(np.percentile(aim_deg, 99)),
     )
 
 
-def _rate_share(writes: Writes, azimuth: AxisLimits, elevation: AxisLimits) -> float:
-    """Between two writes that are both followed, less what rounding to 16 bits can add."""
+def _rate_share(writes: Writes, azimuth: AxisLimits, elevation: AxisLimits, step_deg: float) -> float:
+    """Between two writes that are both followed, less what rounding can add."""
     fastest = 0.0
     for i, k in pairwise(range(writes.tai_s.size)):
         if not (writes.is_followed[i] and writes.is_followed[k]):
@@ -86,7 +87,7 @@ def _rate_share(writes: Writes, azimuth: AxisLimits, elevation: AxisLimits) -> f
             (wrap_180(float(writes.az_deg[k] - writes.az_deg[i])), azimuth),
             (float(writes.el_deg[k] - writes.el_deg[i]), elevation),
         ):
-            fastest = max(fastest, (abs(moved_deg) - LSB_DEG) / gap_s / limits.max_rate_deg_s)
+            fastest = max(fastest, (abs(moved_deg) - step_deg) / gap_s / limits.max_rate_deg_s)
     return fastest
 
 

@@ -6,28 +6,22 @@ Angles are in the encoder frame, azimuth continuous.
 
 from collections.abc import Callable
 
+from acu_daemon.acu.commands import AcuMode, Identify, Poll, ReadFaults, SelectBackup, SelectMode, Stop
 from acu_daemon.drivers.sa3842.angles import elevation_deg
 from acu_daemon.drivers.sa3842.codec import CommandEvent, encode_reply
 from acu_daemon.drivers.sa3842.messages import (
     Ack,
-    AcuMode,
     ClearChange,
     Command,
-    Identify,
     Identity,
     Nak,
     Parameter,
-    Poll,
-    ReadFaults,
     ReadParameter,
     ReadRegisters,
     RegisterContents,
     Reply,
     ResetFault,
-    SelectBackup,
-    SelectMode,
     Status,
-    Stop,
     Stow,
     WriteAndPoll,
     WriteParameter,

@@ -1,6 +1,6 @@
 """SIMULATION of the ACU's modes: autotrack, its backups and their timers (docs/protocol.md, Behaviour).  No angles."""
 
-from acu_daemon.drivers.sa3842.messages import AcuMode, Backup
+from acu_daemon.acu.commands import AcuMode, Backup
 from acu_daemon.sim.parameters import Parameters
 
 HELD_FAST = (AcuMode.STOWING, AcuMode.STOWED, AcuMode.FAULT)  # REMOTE and AUTOTRACK cannot be selected from here

@@ -1,6 +1,7 @@
 """SIMULATION of what the ACU shows: status block, and flags that it watches (docs/protocol.md, Status block)."""
 
-from acu_daemon.drivers.sa3842.messages import AcuMode, Faults, Status
+from acu_daemon.acu.commands import AcuMode
+from acu_daemon.drivers.sa3842.messages import Faults, Status
 from acu_daemon.sim.acu_modes import BACKUP_MODES, Modes
 from acu_daemon.sim.antenna import SimulatedAntenna
 

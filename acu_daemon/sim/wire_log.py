@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
-from acu_daemon.drivers.sa3842.messages import AcuMode
+from acu_daemon.acu.commands import AcuMode
 from acu_daemon.errors import UsageError
 from acu_daemon.orbit.timescales import utc_text
 

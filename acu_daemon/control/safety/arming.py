@@ -5,11 +5,11 @@ Disarmed, nothing is written; in mid-pass a STOP goes before that.
 
 from dataclasses import replace
 
+from acu_daemon.acu.commands import AcuMode, Command, SetWatchdog, Stop
+from acu_daemon.acu.replies import Done
 from acu_daemon.control.control_config import ControlConfig
-from acu_daemon.control.startup import WATCHDOG
 from acu_daemon.control.state import Arming, ControlState, StartStage, Watchdog
 from acu_daemon.control.tick_input import Exchange
-from acu_daemon.drivers.sa3842.messages import Ack, AcuMode, Command, Stop, WriteParameter
 
 NO_STOP_MODES = (AcuMode.MANUAL, AcuMode.STOWING, AcuMode.STOWED, AcuMode.FAULT)  # a stop would disturb, or do nothing
 
@@ -31,7 +31,7 @@ def owe_stop(state: ControlState, *, is_due: bool = True) -> ControlState:
 
 def take_stop(state: ControlState, extra: Exchange) -> ControlState:
     """The ACU has acknowledged STOP: none is owed."""
-    return owe_stop(state, is_due=False) if isinstance(extra.command, Stop) and isinstance(extra.reply, Ack) else state
+    return owe_stop(state, is_due=False) if isinstance(extra.command, Stop) and isinstance(extra.reply, Done) else state
 
 
 def owe_no_stop_to_others(state: ControlState) -> ControlState:
@@ -48,7 +48,7 @@ def last_command(state: ControlState, config: ControlConfig) -> Command | None:
     if state.arming.is_stop_due and status is not None and status.mode not in NO_STOP_MODES:
         return Stop()
     if state.startup.watchdog is Watchdog.SET and not state.is_armed(config):
-        return WriteParameter(WATCHDOG, 0)
+        return SetWatchdog(0.0)
     return None
 
 

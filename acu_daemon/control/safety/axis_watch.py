@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 from enum import Enum, auto
 from math import cos, inf, radians
 
-from acu_daemon.drivers.sa3842.messages import AcuMode, Status
+from acu_daemon.acu.commands import AcuMode
+from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.model import AxisLimits
 
 PROGRESS_SHARE = 0.25  # of the following error: an axis that came so much nearer to its command obeys
@@ -67,8 +68,8 @@ class AxisWatch:
     fast_since_tai_s: float = inf
 
 
-def duty_of(status: Status) -> Duty:
-    """What the mode asks of the axes (docs/protocol.md, Behaviour)."""
+def duty_of(status: AcuStatus) -> Duty:
+    """What the mode asks of the axes (docs/adding-an-acu.md, Modes)."""
     if status.mode in UNWATCHED_MODES or not status.is_remote_enabled:
         return Duty.UNWATCHED
     if status.follows_registers:
@@ -166,7 +167,7 @@ class AxesWatch:
 
 def watch_axes(
     watch: AxesWatch,
-    status: Status,
+    status: AcuStatus,
     az: AxisSeen,
     el: AxisSeen,
     limits: tuple[AxisLimits, AxisLimits],
@@ -179,12 +180,12 @@ def watch_axes(
     return AxesWatch(new_az, new_el), "; ".join(problems)
 
 
-def az_ends(status: Status) -> tuple[bool, bool]:
+def az_ends(status: AcuStatus) -> tuple[bool, bool]:
     """Whether the azimuth is at its clockwise and at its counter-clockwise limit."""
     return status.is_at_cw_limit, status.is_at_ccw_limit
 
 
-def el_ends(status: Status) -> tuple[bool, bool]:
+def el_ends(status: AcuStatus) -> tuple[bool, bool]:
     """Whether the elevation is at its upper and at its lower limit."""
     return status.is_at_up_limit, status.is_at_down_limit
 

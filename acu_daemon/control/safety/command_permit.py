@@ -6,32 +6,27 @@ only where stage, arming, latch and limits allow it, and what it keeps back is a
 
 from math import isfinite
 
-from acu_daemon.control.control_config import ControlConfig
-from acu_daemon.control.orders import Event, Orders
-from acu_daemon.control.registers import count_refusals
-from acu_daemon.control.startup import SECTOR, WATCHDOG
-from acu_daemon.control.state import ControlState, StartStage
-from acu_daemon.drivers.sa3842.angles import LSB_DEG
-from acu_daemon.drivers.sa3842.messages import (
+from acu_daemon.acu.commands import (
+    READS,
     AcuMode,
     Backup,
     Command,
-    Identify,
+    FreeTurnChoice,
+    PointAndPoll,
+    PointAt,
     Poll,
-    ReadFaults,
-    ReadParameter,
-    ReadRegisters,
     SelectBackup,
     SelectMode,
+    SetWatchdog,
     Stop,
-    WriteAndPoll,
-    WriteParameter,
-    WriteRegisters,
     command_text,
 )
+from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.orders import Event, Orders
+from acu_daemon.control.registers import count_refusals
+from acu_daemon.control.state import ControlState, StartStage
 from acu_daemon.pointing.envelope import Envelope
 
-READS = (Identify, Poll, ReadRegisters, ReadFaults, ReadParameter)
 SELECTED_MODES = (AcuMode.STANDBY, AcuMode.REMOTE, AcuMode.AUTOTRACK)
 
 
@@ -56,7 +51,7 @@ def refusal(command: Command, state: ControlState, now_tai_s: float, config: Con
         return ""
     if config.is_shadow:
         return "a shadow commands nothing"
-    if isinstance(command, Stop) or command == WriteParameter(WATCHDOG, 0):
+    if isinstance(command, Stop) or command == SetWatchdog(0.0):
         return ""
     if state.latch.problem:
         return f"latched: {state.latch.problem}"
@@ -70,22 +65,22 @@ def refusal(command: Command, state: ControlState, now_tai_s: float, config: Con
 def _of_kind(command: Command, state: ControlState, now_tai_s: float, config: ControlConfig) -> str:
     stage, is_ready = state.startup.stage, state.startup.stage is StartStage.READY
     match command:
-        case WriteAndPoll(az_deg=az_deg, el_deg=el_deg) if is_ready:
-            return of_angles(az_deg, el_deg, now_tai_s, config.envelope)
-        case WriteRegisters(az_deg=az_deg, el_deg=el_deg) if stage >= StartStage.SECTOR_FREE:
-            return of_angles(az_deg, el_deg, now_tai_s, config.envelope)
+        case PointAndPoll(az_deg=az_deg, el_deg=el_deg) if is_ready:
+            return of_angles(az_deg, el_deg, now_tai_s, config.envelope, config.acu.angle_step_deg)
+        case PointAt(az_deg=az_deg, el_deg=el_deg) if stage >= StartStage.SECTOR_FREE:
+            return of_angles(az_deg, el_deg, now_tai_s, config.envelope, config.acu.angle_step_deg)
         case SelectMode(mode=mode) if is_ready and mode in SELECTED_MODES:
             return ""
         case SelectBackup(backup=Backup.REMOTE) if is_ready:
             return ""
-        case WriteParameter(name=name) if name in (SECTOR, WATCHDOG) and stage >= StartStage.REGISTERS_KNOWN:
+        case FreeTurnChoice() | SetWatchdog() if stage >= StartStage.REGISTERS_KNOWN:
             return ""
     return "not in its place"
 
 
-def of_angles(az_deg: float, el_deg: float, now_tai_s: float, envelope: Envelope) -> str:
+def of_angles(az_deg: float, el_deg: float, now_tai_s: float, envelope: Envelope, step_deg: float) -> str:
     """Why registers must not be written with such angles; empty: they may."""
     for name, angle_deg in (("azimuth", az_deg), ("elevation", el_deg)):
         if not isfinite(angle_deg):
             return f"{name} is not a finite angle"
-    return envelope.why_not(az_deg, el_deg, now_tai_s, LSB_DEG)
+    return envelope.why_not(az_deg, el_deg, now_tai_s, step_deg)

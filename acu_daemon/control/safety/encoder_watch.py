@@ -6,8 +6,8 @@ nothing is fitted, but nothing is stopped.
 
 from dataclasses import dataclass
 
+from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.control.safety.axis_watch import az_ends, el_ends, sky_scale
-from acu_daemon.drivers.sa3842.messages import Status
 from acu_daemon.model import Pointing
 
 FROZEN_DEG = 0.1  # 18 codes: so far must the satellite move, on the sky, under an encoder that shows the same one
@@ -31,7 +31,7 @@ class EncoderWatch:
         return "elevation encoder frozen" if abs(self.el_moved_deg) > FROZEN_DEG else ""
 
 
-def watch_encoders(watch: EncoderWatch, tai_s: float, status: Status, path: Pointing | None) -> EncoderWatch:
+def watch_encoders(watch: EncoderWatch, tai_s: float, status: AcuStatus, path: Pointing | None) -> EncoderWatch:
     """Take one more reading, and the path at its time; an axis at its limit may well stand.
 
     path: of the satellite that autotrack holds; None: it holds none, and the watch begins anew.

@@ -3,15 +3,15 @@
 from dataclasses import replace
 from math import inf
 
+from acu_daemon.acu.commands import AcuMode, Backup, ReadFaults
+from acu_daemon.acu.replies import FaultReport, Refused
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState, ForeignStop, Held, StartStage
 from acu_daemon.control.tick_input import Observation
 from acu_daemon.control.tracking.state_table import ACTIVE, TrackState
-from acu_daemon.drivers.sa3842.messages import AcuMode, Backup, Faults, Nak, ReadFaults
 
 STOPPED_FROM = (AcuMode.REMOTE, AcuMode.ACQUIRE, AcuMode.AUTOTRACK, AcuMode.REMOTE_BACKUP)
 ANOTHER_HAND = "another hand that stopped the antenna"
-WATCHDOG_TRIPPED = 2  # of the system nibble of FAULT DETAIL
 
 
 def watch_for_stop(before: ControlState, state: ControlState, config: ControlConfig) -> tuple[ControlState, bool]:
@@ -19,7 +19,7 @@ def watch_for_stop(before: ControlState, state: ControlState, config: ControlCon
 
     Held before a lost link, a hang or a crash counts as well.  Sign of a power cycle: the backup is forgotten.  Of the
     register watchdog: its fault bit.  That stays until it is reset; where it stood already, time must tell.  Where the
-    status does not show it, but time would have been, it is doubted until FAULT DETAIL tells.
+    status does not show it, but time would have been, it is doubted until the ACU says what its fault is.
     before: the memory one tick ago.  Returns whether another hand has stopped the antenna.
     """
     now, held = state.intake.status, state.foreign_stop.held
@@ -39,13 +39,13 @@ def watch_for_stop(before: ControlState, state: ControlState, config: ControlCon
 
 
 def take_faults(state: ControlState, seen: Observation) -> tuple[ControlState, bool]:
-    """Take the answer of FAULT DETAIL: the register watchdog has tripped, or another hand has stopped the antenna."""
+    """Take what the ACU says of its faults: its register watchdog has tripped, or another hand has stopped it."""
     if not state.foreign_stop.is_doubted or seen.extra is None or seen.extra.command != ReadFaults():
         return state, False
-    reply = seen.extra.reply  # FAULT DETAIL is answered always; an ACU that refuses it knows no such bit
-    if isinstance(reply, Faults) and reply.system & WATCHDOG_TRIPPED:
+    reply = seen.extra.reply  # an ACU that refuses to tell knows no such fault
+    if isinstance(reply, FaultReport) and reply.has_watchdog_tripped:
         return forget_held(state), False
-    return state, isinstance(reply, Faults | Nak)
+    return state, isinstance(reply, FaultReport | Refused)
 
 
 def note_held(state: ControlState, config: ControlConfig) -> ControlState:

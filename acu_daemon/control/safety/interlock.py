@@ -2,24 +2,23 @@
 
 from dataclasses import replace
 
+from acu_daemon.acu.commands import Command, ReadFaults
+from acu_daemon.acu.replies import AcuStatus, FaultReport
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState, Interlock, StartStage
 from acu_daemon.control.tick_input import Observation
 from acu_daemon.control.tracking.state_table import TrackState
-from acu_daemon.drivers.sa3842.messages import Command, Faults, ReadFaults, Status
-
-EMERGENCY_STOP, DOOR_OPEN = 1, 2  # of the interlock nibble: docs/protocol.md, Fault detail
 
 
 def watch_interlock(state: ControlState, seen: Observation, config: ControlConfig) -> tuple[ControlState, str]:
     """Whether a person is at the antenna, and only a person can say that this is over; empty: nobody is seen."""
     faults = seen.extra.reply if seen.extra is not None else None
-    if not isinstance(faults, Faults) or state.intake.status is None:
+    if not isinstance(faults, FaultReport) or state.intake.status is None:
         return state if state.tracking.track is TrackState.FAULT else forget_faults(state), ""
     state = replace(state, interlock=Interlock(_faults(state.intake.status)))
-    if not faults.interlock & (EMERGENCY_STOP | DOOR_OPEN) or not state.is_armed(config):
+    if not (faults.is_emergency_stop or faults.is_door_open) or not state.is_armed(config):
         return state, ""
-    return state, "the emergency stop" if faults.interlock & EMERGENCY_STOP else "an open door"
+    return state, "the emergency stop" if faults.is_emergency_stop else "an open door"
 
 
 def question(state: ControlState) -> Command | None:
@@ -38,7 +37,7 @@ def forget_faults(state: ControlState) -> ControlState:
     return state if state.interlock.faults_read is None else replace(state, interlock=Interlock())
 
 
-def _faults(status: Status) -> tuple[bool, ...]:
+def _faults(status: AcuStatus) -> tuple[bool, ...]:
     return (
         status.has_azimuth_fault,
         status.has_elevation_fault,

@@ -7,8 +7,8 @@ mode may be anything, when half a second of them agree.
 
 from dataclasses import dataclass
 
+from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.control.safety.axis_watch import sky_scale
-from acu_daemon.drivers.sa3842.messages import AcuMode, Backup, Status
 from acu_daemon.model import AxisLimits
 from acu_daemon.units import wrap_180
 
@@ -16,39 +16,17 @@ MOVED_COUNT, CONTRADICTING_COUNT = 2, 5  # in a row, before they are believed
 SLACK_DEG = 1.0  # on the sky: noise, and more is left to the reading gate
 RATE_MARGIN = 1.5  # of the drive's rate
 CONFIRMED_COUNT = 3  # in a row show the antenna in one place: then it is there, and not garbled alike
-CONFIRMED_S, CONFIRMED_DEG = 0.5, 0.5  # between two of them; on the sky, where no satellite is faster in a tick
-BACKUP_MODES = (AcuMode.RATE_MEMORY, AcuMode.POSITION_MEMORY, AcuMode.REMOTE_BACKUP)
-SELECTED_MODES = (AcuMode.ACQUIRE, AcuMode.AUTOTRACK)  # autotrack is selected in these, and in the backup modes
-DESELECTED_MODES = (AcuMode.STANDBY, AcuMode.MANUAL, AcuMode.REMOTE, AcuMode.STOWING, AcuMode.STOWED, AcuMode.FAULT)
-
-
-def contradictions(status: Status) -> tuple[str, ...]:
-    """What in a status block cannot be true at once (docs/protocol.md, A status that cannot be true)."""
-    mode, is_selected = status.mode, status.is_autotrack_selected
-    has_fault = (
-        status.has_azimuth_fault or status.has_elevation_fault or status.has_tilt_fault or status.has_interlock_fault
-    )
-    found = {
-        "mode and control": (mode is AcuMode.MANUAL) == status.is_remote_enabled and mode is not AcuMode.FAULT,
-        "mode and backup": (mode in BACKUP_MODES) != status.is_backup_active
-        or (mode in BACKUP_MODES and (mode is AcuMode.REMOTE_BACKUP) != (status.backup_selected is Backup.REMOTE)),
-        "mode and autotrack": is_selected if mode in DESELECTED_MODES else not is_selected,
-        "mode and fault": mode is AcuMode.FAULT and not has_fault,
-        "mode and registers": status.are_registers_idle
-        and (status.follows_registers or not status.are_registers_written),
-        "mode and stow pin": (mode is AcuMode.STOWED) != status.is_stow_pin_in,
-    }
-    return tuple(name for name, is_so in found.items() if is_so)
+CONFIRMED_DEG = 0.5  # between two of them, on the sky, where no satellite is faster in a tick
 
 
 @dataclass(frozen=True, slots=True)
 class Plausibility:
     """The last status that was believed, the last one that was not, and how many agree."""
 
-    believed: tuple[float, Status] | None = None
-    doubted: tuple[float, Status] | None = None
+    believed: tuple[float, AcuStatus] | None = None
+    doubted: tuple[float, AcuStatus] | None = None
     agreeing_count: int = 0
-    last: tuple[float, Status] | None = None
+    last: tuple[float, AcuStatus] | None = None
     steady_count: int = 0  # in a row, the last one among them
     doubted_count: int = 0  # in all
     reason: str = ""  # of a doubt about the last one, be it believed or not
@@ -61,12 +39,18 @@ class Plausibility:
 
 
 def judge(
-    known: Plausibility, status: Status, tai_s: float, azimuth: AxisLimits, elevation: AxisLimits
+    known: Plausibility,
+    status: AcuStatus,
+    tai_s: float,
+    azimuth: AxisLimits,
+    elevation: AxisLimits,
+    within_s: float,
 ) -> Plausibility:
-    """Judge the next status, sampled at an instant."""
+    """Judge the next status, sampled at an instant.  within_s: of each other two statuses confirm a place."""
     limits, now = (azimuth, elevation), (tai_s, status)
-    steady_count = 1 + (known.steady_count if known.last is not None and _is_steady(known.last, status, tai_s) else 0)
-    wrong = contradictions(status)
+    is_steady = known.last is not None and _is_steady(known.last, status, tai_s, within_s)
+    steady_count = 1 + (known.steady_count if is_steady else 0)
+    wrong = status.contradictions
     reason = f"contradicts itself: {', '.join(wrong)}" if wrong else _moved(known.believed, status, tai_s, limits)
     if not reason:
         return Plausibility(now, None, 0, now, steady_count, known.doubted_count, "", True)
@@ -81,18 +65,18 @@ def judge(
 
 
 def _agrees(
-    doubted: tuple[float, Status] | None,
-    status: Status,
+    doubted: tuple[float, AcuStatus] | None,
+    status: AcuStatus,
     wrong: tuple[str, ...],
     tai_s: float,
     limits: tuple[AxisLimits, AxisLimits],
 ) -> bool:
     """Whether the last doubted status, just before this one, says the same."""
-    return doubted is not None and contradictions(doubted[1]) == wrong and not _moved(doubted, status, tai_s, limits)
+    return doubted is not None and doubted[1].contradictions == wrong and not _moved(doubted, status, tai_s, limits)
 
 
 def _moved(
-    before: tuple[float, Status] | None, status: Status, tai_s: float, limits: tuple[AxisLimits, AxisLimits]
+    before: tuple[float, AcuStatus] | None, status: AcuStatus, tai_s: float, limits: tuple[AxisLimits, AxisLimits]
 ) -> str:
     """Which axis moved further than its drive can; empty: none, or nothing is known of before."""
     if before is None:
@@ -110,8 +94,8 @@ def _moved(
     return ""
 
 
-def _is_steady(before: tuple[float, Status], status: Status, tai_s: float) -> bool:
+def _is_steady(before: tuple[float, AcuStatus], status: AcuStatus, tai_s: float, within_s: float) -> bool:
     """Whether two in a row show the antenna in one place."""
     az_deg = abs(wrap_180(status.az_deg - before[1].az_deg)) * sky_scale(status.el_deg)
     el_deg = abs(status.el_deg - before[1].el_deg)
-    return tai_s - before[0] <= CONFIRMED_S and max(az_deg, el_deg) <= CONFIRMED_DEG
+    return tai_s - before[0] <= within_s and max(az_deg, el_deg) <= CONFIRMED_DEG

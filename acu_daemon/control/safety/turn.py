@@ -1,7 +1,7 @@
 """On which turn of the cable wrap the antenna stands, and whether that can be true.  Pure.
 
 The encoder shows a bearing.  With a range of at most 360 deg it has one turn; with a wider one a bearing beside the
-ends has two, and one bit of the status block (docs/protocol.md) tells them apart: the half of the range.  A bit may be
+ends has two, and one bit of the status (docs/adding-an-acu.md) tells them apart: the half of the range.  A bit may be
 stuck, not driven or random, so it is believed only for the first place.  From there the motion is counted: between two
 readings no drive makes a turn, so the turn nearest to the last place is the right one.  Three things make a place sure,
 whatever was believed: a bearing that one turn alone reaches, a limit switch at its end, and a move that only one turn
@@ -25,8 +25,8 @@ from dataclasses import dataclass, replace
 from enum import Enum, auto
 from math import inf
 
+from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.control.safety.axis_watch import BRAKING_MARGIN
-from acu_daemon.drivers.sa3842.messages import Status
 from acu_daemon.model import AxisLimits
 from acu_daemon.pointing.wrap import END_SLACK_DEG, encoder_continuous, is_one_turn, middle_deg, nearest_turn, turns_of
 from acu_daemon.units import wrap_180
@@ -85,7 +85,7 @@ class TurnWatch:
         return "; ".join(text for text in (self.problem, bit) if text)
 
 
-def locate(watch: TurnWatch, status: Status, limits: AxisLimits, near_deg: float | None) -> tuple[TurnWatch, float]:
+def locate(watch: TurnWatch, status: AcuStatus, limits: AxisLimits, near_deg: float | None) -> tuple[TurnWatch, float]:
     """Where the azimuth is, continuous.  near_deg: where it was a moment ago; None: not known, or not to be relied on.
 
     What speaks against the turn that was counted is believed after AGAINST_COUNT readings in a row: beside the zenith
@@ -112,7 +112,7 @@ def locate(watch: TurnWatch, status: Status, limits: AxisLimits, near_deg: float
     return replace(watch, is_sure=is_sure, sure_count=count), az_deg
 
 
-def _judge_bit(watch: TurnWatch, status: Status, az_deg: float, limits: AxisLimits) -> TurnWatch:
+def _judge_bit(watch: TurnWatch, status: AcuStatus, az_deg: float, limits: AxisLimits) -> TurnWatch:
     off_deg = az_deg - middle_deg(limits)
     half = int(off_deg >= 0.0)
     if watch.phase is not Phase.BELIEVED:

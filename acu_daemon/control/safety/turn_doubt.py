@@ -16,6 +16,8 @@ without a motion (`STANDS`).
 from dataclasses import replace
 from math import inf
 
+from acu_daemon.acu.commands import AcuMode
+from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.intake import RATE_READINGS, shift_places
 from acu_daemon.control.orders import Event
@@ -41,7 +43,6 @@ from acu_daemon.control.state import ControlState, StartStage
 from acu_daemon.control.tick_input import Observation
 from acu_daemon.control.tracking.causes import is_acquired
 from acu_daemon.control.tracking.state_table import ACTIVE, TrackState
-from acu_daemon.drivers.sa3842.messages import AcuMode, Status
 from acu_daemon.model import Reading
 
 LONGEST_STEP_DEG = 170.0  # between two readings; with more the turn is not known by counting
@@ -115,7 +116,7 @@ def watch_turn(
 
 
 def _on_its_way(
-    state: ControlState, status: Status, tai_s: float, config: ControlConfig, events: list[Event]
+    state: ControlState, status: AcuStatus, tai_s: float, config: ControlConfig, events: list[Event]
 ) -> tuple[ControlState, str]:
     goal_deg = _goal_deg(state, status)
     az_deg, limits, scale = state.intake.az_deg, config.azimuth, sky_scale(status.el_deg)
@@ -142,7 +143,7 @@ def is_watched(config: ControlConfig) -> bool:
     return config.following.error_s > 0.0
 
 
-def _is_led(state: ControlState, status: Status, side: int) -> bool:
+def _is_led(state: ControlState, status: AcuStatus, side: int) -> bool:
     """Whether a command is in force that the azimuth should move by, to this side, and no limit switch holds it."""
     in_force, (is_at_max, is_at_min) = state.registers.in_force, az_ends(status)
     if in_force is None or duty_of(status) is not Duty.FOLLOW or (is_at_max if side > 0 else is_at_min):
@@ -150,7 +151,7 @@ def _is_led(state: ControlState, status: Status, side: int) -> bool:
     return side * (in_force[1] - state.intake.az_deg) > LEAD_DEG
 
 
-def _goal_deg(state: ControlState, status: Status) -> float | None:
+def _goal_deg(state: ControlState, status: AcuStatus) -> float | None:
     """Where the azimuth shall go.  On the way to a pass it keeps its goal also while the ACU leaves REMOTE."""
     if state.startup.stage is not StartStage.READY or state.tracking.track not in ACTIVE:
         return None
@@ -159,7 +160,7 @@ def _goal_deg(state: ControlState, status: Status) -> float | None:
     return state.turn.goal_deg if state.tracking.track is TrackState.PREPOSITION else None
 
 
-def _stopped(state: ControlState, status: Status, config: ControlConfig, events: list[Event]) -> ControlState:
+def _stopped(state: ControlState, status: AcuStatus, config: ControlConfig, events: list[Event]) -> ControlState:
     """Wait until the antenna stands; then the other turn is the believed one.
 
     Beside the zenith, where the noise of an azimuth is many degrees, the time that its drive needs to brake must do.
@@ -189,7 +190,9 @@ def _stopped(state: ControlState, status: Status, config: ControlConfig, events:
     return replace(state, turn=turn)
 
 
-def _moved(state: ControlState, status: Status, config: ControlConfig, events: list[Event]) -> tuple[ControlState, str]:
+def _moved(
+    state: ControlState, status: AcuStatus, config: ControlConfig, events: list[Event]
+) -> tuple[ControlState, str]:
     """Whether it follows.  If not in the time that its drive needs: the turn that was believed is, and it is stuck."""
     to_deg, az_deg, limits = state.turn.move_to_deg, state.intake.az_deg, config.azimuth
     is_led = to_deg is not None and state.startup.stage is StartStage.READY and duty_of(status) is Duty.FOLLOW
@@ -219,7 +222,7 @@ def _settled(state: ControlState, learned_count: int = 0) -> ControlState:
 
 
 def locate_azimuth(
-    state: ControlState, status: Status, reading: Reading, config: ControlConfig, events: list[Event]
+    state: ControlState, status: AcuStatus, reading: Reading, config: ControlConfig, events: list[Event]
 ) -> tuple[ControlState, float]:
     """The continuous azimuth.  Once the start is done, or the turn sure, it goes on from where it was."""
     last, turn, before_deg = state.intake.reading, state.turn, state.intake.az_deg

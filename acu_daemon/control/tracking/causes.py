@@ -3,6 +3,8 @@
 from dataclasses import replace
 from math import cos, hypot, radians
 
+from acu_daemon.acu.commands import AcuMode
+from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState, StartStage
 from acu_daemon.control.tick_input import Sky, TickInput
@@ -12,22 +14,20 @@ from acu_daemon.control.tracking.pass_plan import pass_end_tai_s
 from acu_daemon.control.tracking.register_limiter import within_limits
 from acu_daemon.control.tracking.state_table import HOLDING, Cause, TrackState
 from acu_daemon.control.tracking.track_frame import extents, is_within, offset_of
-from acu_daemon.drivers.sa3842.messages import AcuMode, Status
 from acu_daemon.model import Pointing, sky_angle_deg
 from acu_daemon.pointing.wrap import nearest_turn
 
-LINK_SILENCE_S = 0.5  # docs/protocol.md, Link
 ON_POINT_BEAMS = 0.25
 HEARD_BEAMS = 1.0  # a signal that is heard so near to the path is the satellite's
 RESUME_DEG = 5.0  # an antenna this near to the path goes on from an interruption without a new approach
 BEFORE = frozenset({TrackState.IDLE, TrackState.PREPOSITION})  # only there it matters where the antenna stands
-MODE_SETTLE_S = 3.0  # a MODE SELECT takes a moment to show; only later is a left mode the ACU's own doing
+MODE_SETTLE_S = 3.0  # a selected mode takes a moment to show; only later is a left mode the ACU's own doing
 
 
 def find_causes(state: ControlState, given: TickInput, config: ControlConfig) -> set[Cause]:
     """All causes that are present; the table decides which of them matters."""
     status = state.intake.status
-    if given.seen.silence_s > LINK_SILENCE_S or status is None:
+    if given.seen.silence_s > config.acu.silence_s or status is None:
         return {Cause.LINK_SILENT}
     if state.latch.problem:
         return {Cause.LINK_BACK, Cause.LATCHED}
@@ -41,7 +41,7 @@ def find_causes(state: ControlState, given: TickInput, config: ControlConfig) ->
     return causes
 
 
-def _of_others(state: ControlState, status: Status, given: TickInput, config: ControlConfig) -> set[Cause]:
+def _of_others(state: ControlState, status: AcuStatus, given: TickInput, config: ControlConfig) -> set[Cause]:
     """What the ACU does under somebody else's hand, while the daemon is disarmed or in shadow."""
     if not status.is_autotrack_selected:
         return {Cause.HANDS_OFF}
@@ -50,7 +50,7 @@ def _of_others(state: ControlState, status: Status, given: TickInput, config: Co
     return causes | (_of_plan(state, status, given, config) & still)
 
 
-def _of_status(status: Status, *, is_stow_kept: bool) -> set[Cause]:
+def _of_status(status: AcuStatus, *, is_stow_kept: bool) -> set[Cause]:
     is_local = not status.is_remote_enabled or status.mode is AcuMode.MANUAL
     is_stowed = status.mode in (AcuMode.STOWING, AcuMode.STOWED)
     causes = {Cause.LOCAL_PANEL if is_local else Cause.REMOTE_AGAIN}
@@ -62,12 +62,12 @@ def _of_status(status: Status, *, is_stow_kept: bool) -> set[Cause]:
     return causes
 
 
-def is_acquired(status: Status) -> bool:
+def is_acquired(status: AcuStatus) -> bool:
     """Whether autotrack holds a signal: AUTOTRACK with ACQ set."""
     return status.mode is AcuMode.AUTOTRACK and status.is_acquired
 
 
-def _of_signal(state: ControlState, status: Status, given: TickInput, config: ControlConfig) -> set[Cause]:
+def _of_signal(state: ControlState, status: AcuStatus, given: TickInput, config: ControlConfig) -> set[Cause]:
     sky = given.sky
     causes: set[Cause] = set()
     if sky.prediction is not None:
@@ -84,7 +84,7 @@ def _of_signal(state: ControlState, status: Status, given: TickInput, config: Co
     return causes
 
 
-def _is_ours(state: ControlState, status: Status, given: TickInput, config: ControlConfig) -> bool:
+def _is_ours(state: ControlState, status: AcuStatus, given: TickInput, config: ControlConfig) -> bool:
     """Whether what autotrack holds can be this pass: late enough, and where it was found so, near the path."""
     sky, now_tai_s = given.sky, given.now_tai_s
     if sky.plan is None or now_tai_s < sky.plan.rise_tai_s - ACQUIRE_LEAD_S:
@@ -101,7 +101,7 @@ def _is_ours(state: ControlState, status: Status, given: TickInput, config: Cont
     )
 
 
-def _of_plan(state: ControlState, status: Status, given: TickInput, config: ControlConfig) -> set[Cause]:
+def _of_plan(state: ControlState, status: AcuStatus, given: TickInput, config: ControlConfig) -> set[Cause]:
     sky, plan, now_tai_s = given.sky, given.sky.plan, given.now_tai_s
     if plan is None:
         return set()
@@ -126,7 +126,7 @@ def _reached(target: Pointing, state: ControlState, config: ControlConfig) -> Po
 
 
 def _of_place(
-    state: ControlState, status: Status, sky: Sky, target: Pointing, config: ControlConfig, *, is_in_pass: bool
+    state: ControlState, status: AcuStatus, sky: Sky, target: Pointing, config: ControlConfig, *, is_in_pass: bool
 ) -> set[Cause]:
     """How near the antenna is to the path, once a signal may come.
 
@@ -157,13 +157,13 @@ def path_point(sky: Sky, tai_s: float, *, follow: bool = True) -> Pointing | Non
     return None
 
 
-def _distance_deg(state: ControlState, status: Status, target: Pointing) -> float:
+def _distance_deg(state: ControlState, status: AcuStatus, target: Pointing) -> float:
     """Angle on the sky between antenna and path, less what the path moved since the reading."""
     lag_deg = 0.15 * hypot(target.az_rate_deg_s * cos(radians(target.el_deg)), target.el_rate_deg_s)
     return sky_angle_deg(state.intake.az_deg, status.el_deg, target.az_deg, target.el_deg) - lag_deg
 
 
-def _of_time(state: ControlState, status: Status, given: TickInput, config: ControlConfig) -> set[Cause]:
+def _of_time(state: ControlState, status: AcuStatus, given: TickInput, config: ControlConfig) -> set[Cause]:
     sky, now_tai_s, track = given.sky, given.now_tai_s, state.tracking.track
     in_state_s = now_tai_s - state.tracking.entered_tai_s
     causes: set[Cause] = set()

@@ -3,8 +3,8 @@
 Commands stand still between hand-overs, so the servo chases a staircase.  A servo with lag T (first order) that is
 given steps s every period h shows, at the moment phi after a step took effect, an angle g * s short of the newest
 step, where g = exp(-phi/T) / (1 - exp(-h/T)).  g is found by least squares over the readings of the pass and turned
-back into T, weighed against what the servo lets one expect; the aim of the commands then leads by T (docs/protocol.md,
-Time tags; the field's complaint: "the antenna always lags").
+back into T, weighed against what the servo lets one expect; the aim of the commands then leads by T
+(docs/adding-an-acu.md, Timing; the field's complaint: "the antenna always lags").
 """
 
 from dataclasses import dataclass
@@ -12,9 +12,9 @@ from functools import cache, lru_cache
 from math import exp
 
 MAX_LAG_S = 0.5
-PRIOR_LAG_S = 0.0125  # half of the greatest following error: docs/protocol.md, Servo
+PRIOR_LAG_S = 0.0125  # a good servo follows a steady rate within 0.025 deg per deg/s; half of it
 PRIOR_SIGMA_S = 0.0075
-CODE_SIGMA_DEG = 0.0016  # of rounding an angle to 16 bits: the least noise a reading has
+CODE_SIGMA_DEG = 0.0016  # of rounding to a step of 0.0055 deg: the least noise a reading has
 DOUBT_COUNT, DOUBT_SIGMA_DEG = 10, 0.02  # few readings agree by chance: as if so many of this noise were among them
 
 

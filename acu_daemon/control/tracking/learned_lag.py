@@ -5,13 +5,13 @@ control.tracking.lag has the theory.
 
 from dataclasses import replace
 
+from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState, Lag
-from acu_daemon.drivers.sa3842.angles import LSB_DEG
 
 STEADY_SHARE = 0.1  # of a step of the registers: more change than that from one to the next is acceleration
 
 
-def learn_lag(state: ControlState, az_deg: float, el_deg: float) -> ControlState:
+def learn_lag(state: ControlState, az_deg: float, el_deg: float, config: ControlConfig) -> ControlState:
     """The newest of three commands is not in force yet when the angles are sampled: learn from the one before it."""
     if len(state.registers.commands) < 3:
         return state
@@ -20,9 +20,10 @@ def learn_lag(state: ControlState, az_deg: float, el_deg: float) -> ControlState
         return state
     if not (before.is_free and in_force.is_free and newest.is_free):
         return state
+    step_deg = config.acu.angle_step_deg
     if not (
-        _is_steady(before.az_deg, in_force.az_deg, newest.az_deg)
-        and _is_steady(before.el_deg, in_force.el_deg, newest.el_deg)
+        _is_steady(before.az_deg, in_force.az_deg, newest.az_deg, step_deg)
+        and _is_steady(before.el_deg, in_force.el_deg, newest.el_deg, step_deg)
     ):
         return state
     lag = Lag(
@@ -37,7 +38,7 @@ def forget_lag(state: ControlState) -> ControlState:
     return replace(state, lag=Lag())
 
 
-def _is_steady(before_deg: float, in_force_deg: float, newest_deg: float) -> bool:
+def _is_steady(before_deg: float, in_force_deg: float, newest_deg: float, step_deg: float) -> bool:
     """Whether an axis moves at a nearly constant rate, so that what it is short of is lag, not acceleration."""
-    step_deg, next_deg = in_force_deg - before_deg, newest_deg - in_force_deg
-    return abs(next_deg - step_deg) < STEADY_SHARE * abs(step_deg) + 2 * LSB_DEG
+    first_deg, next_deg = in_force_deg - before_deg, newest_deg - in_force_deg
+    return abs(next_deg - first_deg) < STEADY_SHARE * abs(first_deg) + 2 * step_deg

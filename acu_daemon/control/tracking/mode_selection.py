@@ -1,17 +1,17 @@
 """Which mode or backup the present state needs: judged by the status, so a command repeats until it shows."""
 
+from acu_daemon.acu.commands import AcuMode, Backup, Command, SelectBackup, SelectMode
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tracking.state_table import AUTOTRACKING, HOLDING, TrackState
-from acu_daemon.drivers.sa3842.messages import AcuMode, Backup, Command, SelectBackup, SelectMode
 
-STANDBY = SelectMode(AcuMode.STANDBY)  # the one mode command that the ACU takes in STOWED: docs/protocol.md, Behaviour
+STANDBY = SelectMode(AcuMode.STANDBY)  # the one mode command that the ACU takes in STOWED: docs/adding-an-acu.md, Modes
 UNDER_AUTOTRACK = AUTOTRACKING | HOLDING | {TrackState.ACQUIRE_TLE, TrackState.SEARCH}
 
 
 def wanted_mode_command(state: ControlState, *, is_settled: bool) -> Command | None:
     """The next command on the way to what the state needs; None when the ACU is there.
 
-    The backup comes before the mode, and the registers are written before either (docs/protocol.md, Behaviour).
+    The backup comes before the mode, and the registers are written before either (docs/adding-an-acu.md, Modes).
     is_settled: nothing was commanded for a while, so that what the status says of the mode is no transient.
     """
     status = state.intake.status

@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import copysign, cos, isfinite, radians
 
+from acu_daemon.acu.angle_steps import clamp_to_step
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tracking.keep_clear import AROUND_SHARE, braking, led_clear
-from acu_daemon.drivers.sa3842.angles import clamp_deg
 from acu_daemon.model import AxisLimits, Pointing
 from acu_daemon.pointing.axis import AxisState, step
 from acu_daemon.pointing.wrap import nearest_end_deg
@@ -32,7 +32,7 @@ FRESH_S = 1.0  # readings older than this say nothing about the present rate
 
 @dataclass(frozen=True, slots=True)
 class Passed:
-    """What may be sent: axis states (their positions are exact wire angles within the limits), or why nothing new."""
+    """What may be sent: axis states at angles that the ACU can carry, within the limits; or why nothing new."""
 
     az: AxisState
     el: AxisState
@@ -46,9 +46,12 @@ def limit(
 ) -> Passed:
     """Let a wanted pointing pass, hold it back, or refuse it.  dt_s: since the last write."""
     az, el = _from(state, now_tai_s, is_followed=is_followed)
+    step_deg = config.acu.angle_step_deg
     if not wanted.is_finite:
         az, el = replace(az, rate_deg_s=0.0), replace(el, rate_deg_s=0.0)
-        return Passed(_legal(az, config.azimuth), _legal(el, config.elevation), True, "not a finite angle")
+        return Passed(
+            _legal(az, config.azimuth, step_deg), _legal(el, config.elevation, step_deg), True, "not a finite angle"
+        )
     wanted, limited = within_limits(wanted, az.position_deg, config)
     azimuth, elevation, has_zones = config.azimuth, config.elevation, config.envelope.has_zones
     if has_zones:
@@ -69,7 +72,8 @@ def limit(
         if has_zones:
             new_az, new_el = braking((az, el), (new_az, new_el), dt_s, now_tai_s, config.envelope)
     is_held_back = new_az.position_deg != wanted.az_deg or new_el.position_deg != wanted.el_deg
-    return Passed(_legal(new_az, config.azimuth), _legal(new_el, config.elevation), is_held_back, limited=limited)
+    az, el = _legal(new_az, config.azimuth, step_deg), _legal(new_el, config.elevation, step_deg)
+    return Passed(az, el, is_held_back, limited=limited)
 
 
 def within_limits(wanted: Pointing, near_az_deg: float, config: ControlConfig) -> tuple[Pointing, str]:
@@ -178,7 +182,7 @@ def _share(limits: AxisLimits, rate: float, acceleration: float) -> AxisLimits:
     )
 
 
-def _legal(axis: AxisState, limits: AxisLimits) -> AxisState:
+def _legal(axis: AxisState, limits: AxisLimits, step_deg: float) -> AxisState:
     if not isfinite(axis.position_deg):
         return axis  # nothing good was known: the command permit keeps it back
-    return AxisState(clamp_deg(axis.position_deg, limits.min_deg, limits.max_deg), axis.rate_deg_s)
+    return AxisState(clamp_to_step(axis.position_deg, limits.min_deg, limits.max_deg, step_deg), axis.rate_deg_s)

@@ -1,36 +1,34 @@
 """Codec of the SA-3842's messages, host side and ACU side, without IO (docs/protocol.md).
 
-Whoever wants another dialect replaces this module and keeps `messages`.
+`driver` makes field words of them.
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TypeVar
 
+from acu_daemon.acu.commands import AcuMode, Identify, Poll, ReadFaults, SelectBackup, SelectMode, Stop
+from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.drivers.sa3842.angles import azimuth_code, azimuth_deg, elevation_code, elevation_deg
 from acu_daemon.drivers.sa3842.fields import FieldError, hex_text, hex_value, nibble_values, nibbles_text
 from acu_daemon.drivers.sa3842.frame import ACK, NAK, OVERHEAD_BYTES, STX, BadFrame, Frame, FrameDecoder, encode_frame
 from acu_daemon.drivers.sa3842.messages import (
+    BACKUP_NUMBERS,
+    MODE_NIBBLES,
     Ack,
-    AcuMode,
-    Backup,
     ClearChange,
     Command,
     Faults,
     Garbled,
-    Identify,
     Identity,
     Nak,
     Parameter,
-    Poll,
-    ReadFaults,
     ReadParameter,
     ReadRegisters,
     RegisterContents,
     Reply,
     ResetFault,
-    SelectBackup,
-    SelectMode,
     Status,
-    Stop,
     Stow,
     WriteAndPoll,
     WriteParameter,
@@ -38,6 +36,7 @@ from acu_daemon.drivers.sa3842.messages import (
 )
 from acu_daemon.drivers.sa3842.status_block import STATUS_CHARS, decode_status, encode_status
 
+Chosen = TypeVar("Chosen")
 DEFAULT_ADDRESS = ord("1")
 STOW_GUARD = "ST"
 PARAMETER_NAMES = "ARPMTSW"
@@ -85,9 +84,9 @@ def _command_data(command: Command) -> str:
         case WriteRegisters(az_deg, el_deg, int(tilt_code)) | WriteAndPoll(az_deg, el_deg, tilt_code):
             return _angles_text(az_deg, el_deg) + hex_text(tilt_code, 4)
         case SelectMode(mode):
-            return nibbles_text(mode)
+            return nibbles_text(MODE_NIBBLES[mode])
         case SelectBackup(backup):
-            return nibbles_text(backup)
+            return nibbles_text(BACKUP_NUMBERS[backup])
         case Stow():
             return STOW_GUARD
         case ReadParameter(name):
@@ -113,10 +112,9 @@ def decode_command(cmd: int, text: str) -> Command:
             tilt_code = hex_value(text[8:]) if len(text) == 12 else None
             return WriteRegisters(*_angles(text), tilt_code)
         case 0x34:
-            mode = AcuMode(_choice(text, SELECTABLE_MODES))
-            return SelectMode(mode)
+            return SelectMode(_choice(text, {mode: MODE_NIBBLES[mode] for mode in SELECTABLE_MODES}))
         case 0x35:
-            return SelectBackup(Backup(_choice(text, tuple(Backup))))
+            return SelectBackup(_choice(text, BACKUP_NUMBERS))
         case 0x36 if text == STOW_GUARD:
             return Stow()
         case 0x3B:
@@ -156,14 +154,20 @@ def _reply_data(reply: Reply) -> str:
             return ""
 
 
-def decode_reply(cmd: int, text: str) -> Reply:
-    """Read the data of an ACK frame.  FieldError: it does not fit the command byte."""
+StatusReader = Callable[[str], Status | AcuStatus]
+
+
+def decode_reply(cmd: int, text: str, read_status: StatusReader = decode_status) -> Reply | AcuStatus:
+    """Read the data of an ACK frame.  FieldError: it does not fit the command byte.
+
+    read_status: what to make of the status block: all of it, or the field's words.
+    """
     _check_length(text, _REPLY_CHARS.get(cmd, 0))
     match cmd:
         case 0x30:
             return Identity(text[:4], text[4:])
         case 0x31 | 0x41:
-            return decode_status(text)
+            return read_status(text)
         case 0x33:
             return RegisterContents(*_angles(text), hex_value(text[8:12]), hex_value(text[12:]))
         case 0x3A:
@@ -179,14 +183,15 @@ class ReplyEvent:
     """What the host's decoder found: a reply to a command byte, or garble."""
 
     cmd: int | None
-    reply: Reply | Garbled
+    reply: Reply | AcuStatus | Garbled
 
 
 class ReplyDecoder:
     """The host's side: turns a byte stream, cut anywhere, into replies, oldest first; memory is bounded by a frame."""
 
-    def __init__(self, address: int = DEFAULT_ADDRESS) -> None:
+    def __init__(self, address: int = DEFAULT_ADDRESS, read_status: StatusReader = decode_status) -> None:
         self._address = address
+        self._read_status = read_status
         self._frames = FrameDecoder(bytes((ACK, NAK)))
 
     def reset(self) -> None:
@@ -205,7 +210,7 @@ class ReplyDecoder:
         if frame.start == NAK:
             return ReplyEvent(frame.cmd, Nak())
         try:
-            return ReplyEvent(frame.cmd, decode_reply(frame.cmd, frame.data.decode("ascii")))
+            return ReplyEvent(frame.cmd, decode_reply(frame.cmd, frame.data.decode("ascii"), self._read_status))
         except FieldError as error:
             return ReplyEvent(frame.cmd, Garbled(str(error)))
 
@@ -273,9 +278,9 @@ def _check_length(text: str, *char_counts: int) -> None:
         raise FieldError(f"{len(text)} characters of data, expected {' or '.join(map(str, char_counts))}")
 
 
-def _choice(text: str, choices: tuple[int, ...]) -> int:
-    for choice in choices:
-        if text == str(int(choice)):
+def _choice(text: str, numbers: Mapping[Chosen, int]) -> Chosen:
+    for choice, number in numbers.items():
+        if text == str(number):
             return choice
     raise FieldError(f"{text!r} cannot be selected")
 

@@ -14,12 +14,16 @@ Times are readings of any clock that never goes back, seconds.
 
 from math import inf
 
-from acu_daemon.drivers.sa3842.codec import CMD_OF, DEFAULT_ADDRESS, ReplyDecoder, encode_command
-from acu_daemon.drivers.sa3842.messages import Command, Garbled, Identify, Poll, ReadFaults, ReadRegisters, Reply
+from acu_daemon.acu.commands import Identify, Poll, ReadFaults
+from acu_daemon.acu.replies import AcuStatus
+from acu_daemon.drivers.sa3842.codec import CMD_OF, DEFAULT_ADDRESS, ReplyDecoder, StatusReader, encode_command
+from acu_daemon.drivers.sa3842.messages import Command, Garbled, ReadRegisters, Reply
+from acu_daemon.drivers.sa3842.status_block import decode_status
 
 LATE_S = 0.5  # so long after its exchange was given up a reply may still come
 OVERTAKEN_S = 60.0  # so long a line that let a reply be overtaken is not trusted to keep the order
-QUESTIONS: tuple[Command, ...] = (Poll(), Identify(), ReadRegisters(), ReadFaults())  # in turn after a failed exchange
+Question = Poll | Identify | ReadRegisters | ReadFaults
+QUESTIONS: tuple[Question, ...] = (Poll(), Identify(), ReadRegisters(), ReadFaults())  # in turn after a failed exchange
 _QUESTION_TYPES = tuple(type(question) for question in QUESTIONS)
 
 
@@ -30,9 +34,9 @@ class HostExchange:
     to an exchange that was given up; the newest of these came at late_at_s, late_s after the begin of its exchange.
     """
 
-    def __init__(self, address: int = DEFAULT_ADDRESS) -> None:
+    def __init__(self, address: int = DEFAULT_ADDRESS, read_status: StatusReader = decode_status) -> None:
         self._address = address
-        self._decoder = ReplyDecoder(address)
+        self._decoder = ReplyDecoder(address, read_status)
         self._outstanding_cmd: int | None = None
         self._begun_s = 0.0
         self._given_up_s: dict[int, float] = {}  # by CMD: when its newest exchange that failed was given up
@@ -56,7 +60,7 @@ class HostExchange:
         """Whether the next command must be a question, because the last exchange failed."""
         return self._must_poll
 
-    def question(self, now_s: float) -> Command | None:
+    def question(self, now_s: float) -> Question | None:
         """A poll; after a failed exchange the first question whose CMD is free, None where none is before free_s."""
         if not self._must_poll:
             return QUESTIONS[0]
@@ -88,12 +92,12 @@ class HostExchange:
             left[:] = [one for one in left if now_s - one[1] < LATE_S]
         return left or []
 
-    def receive(self, data: bytes, now_s: float) -> Reply | None:
+    def receive(self, data: bytes, now_s: float) -> Reply | AcuStatus | None:
         """Take the next bytes; return the reply to the outstanding command once it is complete.
 
         Also what arrives while none is outstanding, so that it is known to have come.
         """
-        answer: Reply | None = None
+        answer: Reply | AcuStatus | None = None
         for event in self._decoder.feed(data):
             if isinstance(event.reply, Garbled):
                 self.garbled_count += 1

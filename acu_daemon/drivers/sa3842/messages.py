@@ -4,42 +4,9 @@ Angles are degrees in the encoder frame.  The tilt of a command is a wire code, 
 it once read, unchanged.
 """
 
-from dataclasses import dataclass, fields
-from enum import IntEnum
+from dataclasses import dataclass
 
-
-class AcuMode(IntEnum):
-    """Nibble n1 of the status block."""
-
-    STANDBY = 0
-    MANUAL = 1
-    REMOTE = 2
-    ACQUIRE = 3
-    AUTOTRACK = 4
-    RATE_MEMORY = 5
-    POSITION_MEMORY = 6
-    REMOTE_BACKUP = 7
-    STOWING = 8
-    STOWED = 9
-    FAULT = 15
-
-
-class Backup(IntEnum):
-    """What steers after a loss of signal."""
-
-    RATE = 0
-    POSITION = 1
-    REMOTE = 2
-
-
-@dataclass(frozen=True, slots=True)
-class Identify:
-    """Ask which ACU this is."""
-
-
-@dataclass(frozen=True, slots=True)
-class Poll:
-    """Ask for the status block."""
+from acu_daemon.acu.commands import AcuMode, Backup, Identify, Poll, ReadFaults, SelectBackup, SelectMode, Stop
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,27 +24,8 @@ class ReadRegisters:
 
 
 @dataclass(frozen=True, slots=True)
-class SelectMode:
-    """Select STANDBY, REMOTE or AUTOTRACK; no other mode can be selected."""
-
-    mode: AcuMode
-
-
-@dataclass(frozen=True, slots=True)
-class SelectBackup:
-    """Select what steers after a loss of signal."""
-
-    backup: Backup
-
-
-@dataclass(frozen=True, slots=True)
 class Stow:
     """Drive to the stow position."""
-
-
-@dataclass(frozen=True, slots=True)
-class Stop:
-    """Rates to zero, STANDBY."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,11 +36,6 @@ class ClearChange:
 @dataclass(frozen=True, slots=True)
 class ResetFault:
     """Leave FAULT, if the fault is gone."""
-
-
-@dataclass(frozen=True, slots=True)
-class ReadFaults:
-    """Ask for the fault detail."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +80,22 @@ Command = (
 )
 
 
+MODE_NIBBLES = {
+    AcuMode.STANDBY: 0,
+    AcuMode.MANUAL: 1,
+    AcuMode.REMOTE: 2,
+    AcuMode.ACQUIRE: 3,
+    AcuMode.AUTOTRACK: 4,
+    AcuMode.RATE_MEMORY: 5,
+    AcuMode.POSITION_MEMORY: 6,
+    AcuMode.REMOTE_BACKUP: 7,
+    AcuMode.STOWING: 8,
+    AcuMode.STOWED: 9,
+    AcuMode.FAULT: 15,
+}
+BACKUP_NUMBERS = {Backup.RATE: 0, Backup.POSITION: 1, Backup.REMOTE: 2}
+
+
 @dataclass(frozen=True, slots=True)
 class Status:
     """The status block.  az_deg is in [0, 360), is_sector_high tells the turn; agc_db steps by 0.05 dB."""
@@ -173,13 +132,6 @@ class Status:
     is_tilt_moving: bool = False
     is_at_tilt_upper_limit: bool = False
     is_at_tilt_lower_limit: bool = False
-
-    @property
-    def follows_registers(self) -> bool:
-        """Whether a register write moves the antenna in this mode (docs/protocol.md, Behaviour)."""
-        return self.mode in (AcuMode.REMOTE, AcuMode.REMOTE_BACKUP) or (
-            self.mode is AcuMode.ACQUIRE and self.backup_selected is Backup.REMOTE
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,15 +233,3 @@ class Garbled:
 
 
 Reply = Status | RegisterContents | Identity | Ack | Nak | Faults | Parameter
-
-
-def command_text(command: Command) -> str:
-    """A command in a few words, for people."""
-    values = [getattr(command, field.name) for field in fields(command)]
-    return " ".join([type(command).__name__, *(_value_text(value) for value in values if value is not None)])
-
-
-def _value_text(value: object) -> str:
-    if isinstance(value, IntEnum):
-        return value.name
-    return f"{value:.3f}" if isinstance(value, float) else str(value)

@@ -5,11 +5,13 @@ from typing import Any
 
 from acu_daemon.drivers.sa3842.angles import azimuth_code, azimuth_deg, elevation_code, elevation_deg
 from acu_daemon.drivers.sa3842.fields import FieldError, bits_value, hex_text, hex_value, nibble_values, nibbles_text
-from acu_daemon.drivers.sa3842.messages import AcuMode, Backup, Status
+from acu_daemon.drivers.sa3842.messages import BACKUP_NUMBERS, MODE_NIBBLES, Status
 
 STATUS_CHARS = 23
 AGC_LSB_DB = 0.05
 _AGC_MAX_CODE = 0xFFF
+_MODES = {nibble: mode for mode, nibble in MODE_NIBBLES.items()}
+_BACKUPS = {number: backup for backup, number in BACKUP_NUMBERS.items()}
 
 
 def encode_status(status: Status) -> str:
@@ -17,8 +19,8 @@ def encode_status(status: Status) -> str:
     s = status
     agc_code = min(max(round(s.agc_db / AGC_LSB_DB), 0), _AGC_MAX_CODE)
     nibbles = nibbles_text(
-        s.mode,
-        s.backup_selected | bits_value(False, False, s.is_backup_active, s.is_autotrack_selected),
+        MODE_NIBBLES[s.mode],
+        BACKUP_NUMBERS[s.backup_selected] | bits_value(False, False, s.is_backup_active, s.is_autotrack_selected),
         bits_value(s.is_acquired, s.is_loss_latched, s.is_track_valid, s.is_receiver_valid),
         bits_value(s.is_remote_enabled, s.are_registers_written, s.are_registers_idle, s.has_changed),
         bits_value(s.has_azimuth_fault, s.has_elevation_fault, s.has_tilt_fault, s.has_interlock_fault),
@@ -32,9 +34,8 @@ def encode_status(status: Status) -> str:
 
 def decode_status(text: str) -> Status:
     """Read a status block.  FieldError: wrong length, hex, nibble, mode or backup."""
-    if len(text) != STATUS_CHARS:
-        raise FieldError(f"status block of {len(text)} characters, expected {STATUS_CHARS}")
-    flags = _flags(text[15:])
+    check_length(text)
+    flags = decode_flags(text[15:])
     code = hex_value(text[:15])
     return Status(
         az_deg=azimuth_deg(code >> 44),
@@ -45,14 +46,19 @@ def decode_status(text: str) -> Status:
     )
 
 
+def check_length(text: str) -> None:
+    """FieldError: not a status block."""
+    if len(text) != STATUS_CHARS:
+        raise FieldError(f"status block of {len(text)} characters, expected {STATUS_CHARS}")
+
+
 @lru_cache(maxsize=64)
-def _flags(text: str) -> dict[str, Any]:
+def decode_flags(text: str) -> dict[str, Any]:
     """Read the eight nibbles, which stay the same from one status to most of the next: fields of `Status`."""
     n1, n2, n3, n4, n5, n6, n7, n8 = nibble_values(text)
-    try:
-        mode, backup = AcuMode(n1), Backup(n2 & 3)
-    except ValueError as error:
-        raise FieldError(str(error)) from None
+    mode, backup = _MODES.get(n1), _BACKUPS.get(n2 & 3)
+    if mode is None or backup is None:
+        raise FieldError(f"mode {n1} or backup {n2 & 3} does not exist")
     return {
         "mode": mode,
         "backup_selected": backup,

@@ -1,0 +1,28 @@
+"""Which ACU is meant: a driver by the name of its dialect, `[acu] dialect` of station.toml."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from acu_daemon.acu.driver import AcuDriver
+from acu_daemon.drivers.sa3842.codec import address_byte
+from acu_daemon.drivers.sa3842.sa3842_driver import Sa3842Driver
+
+
+@dataclass(frozen=True, slots=True)
+class DriverSettings:
+    """What of station.toml a driver may need.  address: of the ACU on its line, for dialects that have one."""
+
+    address: str = "1"
+    device_delay_s: float = 0.010
+
+
+def _sa3842(settings: DriverSettings) -> AcuDriver:
+    return Sa3842Driver(address_byte(settings.address), settings.device_delay_s)
+
+
+DIALECTS: dict[str, Callable[[DriverSettings], AcuDriver]] = {"sa3842": _sa3842}
+
+
+def make_driver(dialect: str, settings: DriverSettings) -> AcuDriver:
+    """The driver of a dialect, at the beginning of its dialogue.  KeyError: there is none of this name."""
+    return DIALECTS[dialect](settings)
