@@ -26,12 +26,13 @@ from random import Random
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from acu_daemon.acu.commands import AcuMode
+from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.command_permit import of_angles
 from acu_daemon.control.state import ControlState, Intake, Registers
 from acu_daemon.control.tracking.keep_clear import braked
 from acu_daemon.control.tracking.register_limiter import limit
-from acu_daemon.drivers.sa3842.messages import AcuMode, Status
 from acu_daemon.model import AxisLimits, Pointing, Site, Station
 from acu_daemon.pointing.axis import AxisState
 from acu_daemon.pointing.envelope import Envelope
@@ -137,7 +138,7 @@ def wanted(draw: Random, mover: str, envelope: Envelope, tai_s: float, count: in
 
 def a_state(az: AxisState, el: AxisState, antenna: tuple[float, float], *, was_followed: bool) -> ControlState:
     return ControlState(
-        intake=Intake(status=Status(antenna[0] % 360.0, antenna[1], AcuMode.REMOTE), az_deg=antenna[0]),
+        intake=Intake(status=AcuStatus(antenna[0] % 360.0, antenna[1], AcuMode.REMOTE), az_deg=antenna[0]),
         registers=Registers(axis_az=az, axis_el=el, was_followed=was_followed),
     )
 
@@ -173,7 +174,7 @@ def a_sequence(draw: Random, counts: Counts) -> None:
 def judge(counts: Counts, envelope: Envelope, az: AxisState, el: AxisState, tai_s: float, mover: str) -> None:
     """Count what is outside, or cannot stop outside."""
     if envelope.room_deg(az.position_deg, el.position_deg, tai_s) < -ROUNDED_DEG or of_angles(
-        az.position_deg, el.position_deg, tai_s, envelope
+        az.position_deg, el.position_deg, tai_s, envelope, ControlConfig(envelope).acu.angle_step_deg
     ):
         counts.outside += 1
         counts.first = counts.first or f"{mover} {envelope} at {tai_s}: {az} {el}"

@@ -9,10 +9,11 @@ from typing import Any
 
 from troubled_decision import START_TAI_S, TroubledDecision
 
+from acu_daemon.acu.commands import PointAndPoll, PointAt, command_text
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.orders import Orders
 from acu_daemon.control.state import ControlState
-from acu_daemon.drivers.sa3842.messages import WriteAndPoll, WriteRegisters, command_text
+from acu_daemon.drivers.sa3842.sa3842_driver import wire_command
 
 RECORDED = Path(__file__).parent / "recorded_decisions.txt"
 EVERY = 10  # ticks
@@ -46,8 +47,8 @@ def facts(state: ControlState, orders: Orders, config: ControlConfig) -> dict[st
         "locked": state.signal.has_locked,
         "offset_refused": state.signal.is_offset_refused,
         "row": (state.search.scan.row, state.search.scan.side, state.search.scan.is_moving),
-        "first": type(orders.first).__name__,
-        "extra": "" if orders.extra is None else command_text(orders.extra).partition(" az")[0],
+        "first": type(wire_command(orders.first)).__name__,
+        "extra": "" if orders.extra is None else command_text(wire_command(orders.extra)).partition(" az")[0],
     }
 
 
@@ -76,5 +77,5 @@ def lines(decision: TroubledDecision, ordered: list[tuple[ControlState, Orders]]
             yield f"{k} {'; '.join([*changed, *told])}"
         before |= now
         for command in (orders.first, orders.extra):
-            if isinstance(command, WriteRegisters) or (isinstance(command, WriteAndPoll) and k % EVERY == 0):
+            if isinstance(command, PointAt) or (isinstance(command, PointAndPoll) and k % EVERY == 0):
                 yield f"{k} registers {command.az_deg:.3f} {command.el_deg:.3f}"
