@@ -88,6 +88,10 @@ def _between(t: Array, begin_s: float, end_s: float) -> Array:
     return ((t >= begin_s) & (t < end_s)).astype(float)
 
 
+def _hunting(t: Array) -> Array:
+    return 0.12 * np.sin(t) * (t > 25.0)
+
+
 RUNS = {
     "good readings": Run(100.0),
     "kalman": Run(50.0, estimator="kalman"),
@@ -100,7 +104,8 @@ RUNS = {
         50.0, wrong=lambda t: (-1.4 * _between(t, 0, 12), 0.0 * t, 12.0 - 15.0 * _between(t, 0, 12))
     ),
     "another one at first": Run(75.0, other=(12.0, EARLY)),
-    "an axis that hunts": Run(75.0, wrong=lambda t: (0.0 * t, 0.12 * np.sin(t) * _between(t, 25, 60), 12.0 + 0.0 * t)),
+    "an elevation that hunts": Run(75.0, wrong=lambda t: (0.0 * t, _hunting(t) * (t < 60.0), 12.0 + 0.0 * t)),
+    "an azimuth that hunts": Run(60.0, wrong=lambda t: (_hunting(t), 0.0 * t, 12.0 + 0.0 * t), seed=3),
     "a track that drifts away": Run(
         wrong=lambda t: (0.04 * np.clip(t - 30, 0, 40), -0.02 * np.clip(t - 30, 0, 40), 12.0 + 0.0 * t)
     ),
@@ -115,6 +120,9 @@ RUNS = {
     "gone on with": Run(30.0, 120.0, carried=lambda: _left(LATE, 100.0, is_of_this_pass=True)),
     "gone on with, by kalman": Run(20.0, 120.0, "kalman", carried=lambda: _left(LATE, 100.0, is_of_this_pass=True)),
     "gone on with what was another one": Run(50.0, 120.0, carried=lambda: _left(EARLY, 100.0, is_of_this_pass=True)),
+    "gone on with another one, and shown it again": Run(
+        75.0, 120.0, other=(12.0, EARLY), carried=lambda: _left(EARLY, 100.0, is_of_this_pass=True)
+    ),
     "narrow elements that are wrong": Run(
         40.0, settings=replace(SETTINGS, orbit_sigmas=ElementSigmas(mean_anomaly_deg=0.01)), truth=EARLY
     ),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import real_passes
 from conftest import DATA, needs_data
+from made_orbits import circular, site, visible
 from real_passes import RealPass, noisy
 
 from acu_daemon.assist.screening.another_satellite import needed, why_not_this_satellite
@@ -45,6 +46,20 @@ def test_a_real_pass_on_its_own_elements_is_never_told_as_another_also_by_a_cloc
     real, elements = own(name)
     for part in (0.2, 1.0):
         assert why(elements, real, seen(real, late_s, part)) == ""
+
+
+@pytest.mark.parametrize("late_s", [-300.0, -90.0, 90.0, 300.0])
+def test_a_clock_that_is_off_either_way_takes_no_manoeuvre(late_s: float) -> None:
+    """The Earth has turned on meanwhile: that is no change of the node."""
+    source, where = circular(66.0), site(4.0)
+    tai_s = visible(source, where, 4.0)
+    look = look_at(source, tai_s, where)
+    readings = noisy(look.az_deg, look.el_deg, tai_s, 0.01, np.random.default_rng(3))
+    takes = needed(source, where, SETTINGS, replace(readings, tai_s=tai_s + late_s))
+    assert takes is not None
+    assert takes.along_s == pytest.approx(late_s, rel=0.05)
+    assert takes.manoeuvres < 0.5
+    assert takes.near_share == 1.0
 
 
 @needs_data

@@ -6,7 +6,7 @@ import pytest
 from fake_sky import AZIMUTH, ELEVATION, START_TAI_S, Star
 
 from acu_daemon.acu.commands import AcuMode, Backup
-from acu_daemon.drivers.sa3842.codec import ReplyDecoder, ReplyEvent, encode_reply
+from acu_daemon.drivers.sa3842.codec import ReplyDecoder, ReplyEvent, address_byte, encode_reply
 from acu_daemon.drivers.sa3842.messages import Faults, Status
 from acu_daemon.drivers.sa3842.status_block import decode_status, encode_status
 from acu_daemon.sim.acu import FakeAcu
@@ -90,6 +90,20 @@ def test_a_bit_of_the_agc_alone_is_its_weight(bit: int) -> None:
     text = block({}, agc=f"{1 << bit:03X}")
     assert decode_status(text).agc_db == pytest.approx(0.05 * (1 << bit))
     assert encode_status(replace(NONE, agc_db=0.05 * (1 << bit))) == text
+
+
+def test_an_address_is_every_character_from_1_to_small_o_and_no_other() -> None:
+    taken = []
+    for code in range(256):
+        try:
+            assert address_byte(chr(code)) == code
+        except ValueError:
+            continue
+        taken.append(code)
+    assert taken == list(range(0x31, 0x70))
+    for text in ("", "11"):
+        with pytest.raises(ValueError, match="one character"):
+            address_byte(text)
 
 
 FAULT_DETAIL = 0x3A

@@ -4,6 +4,8 @@ What the encoders show is made from vectors here: the true place on the ellipsoi
 belong to it, and the biases as docs and model.AngleBias define them; the mount's axes are the simulator's, which turn.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_orbits import EPOCH_TAI_S, circular, site, visible
@@ -138,6 +140,19 @@ def test_every_sigma_goes_to_its_own_state():
     covariance = make_prior(SOURCE, settings(range(STATE_COUNT)), EPOCH_TAI_S).covariance
     assert np.allclose(np.sqrt(np.diag(covariance)), SIGMAS, rtol=1e-9)
     assert np.count_nonzero(covariance) == STATE_COUNT
+
+
+@pytest.mark.parametrize("states", [{1}, {0, 5, 8}, set(range(STATE_COUNT))], ids=len)
+def test_a_root_of_a_covariance_makes_it_again(states: set[int]):
+    prior = make_prior(SOURCE, settings(states), EPOCH_TAI_S)
+    mixed = np.linalg.qr(np.random.default_rng(1).normal(size=(STATE_COUNT, STATE_COUNT)))[0]
+    sigma = np.sqrt(np.diag(prior.covariance))
+    prior = replace(
+        prior, covariance=np.outer(sigma, sigma) * (mixed @ np.diag(np.linspace(0.1, 2.0, STATE_COUNT)) @ mixed.T)
+    )
+    scale = np.where(sigma > 0.0, sigma, 1.0)
+    assert prior.root.shape == (STATE_COUNT, len(states))
+    assert np.allclose(prior.root @ prior.root.T / np.outer(scale, scale), prior.covariance / np.outer(scale, scale))
 
 
 def test_states_are_taken_apart_and_put_together_in_one_order():
