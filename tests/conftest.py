@@ -6,13 +6,14 @@ import os
 import shutil
 import signal
 import tempfile
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Generator
 from pathlib import Path
 from typing import Any
 
 import pytest
 import pytest_asyncio
 from hypothesis import settings
+from machine_load import STARVED_COUNT, MachineLoad
 from xdist.scheduler import LoadScopeScheduling
 
 PROJECT = Path(__file__).resolve().parents[1]
@@ -51,6 +52,28 @@ class WithStories(LoadScopeScheduling):
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling | None:
     """Take that one for `pytest --dist loadscope`."""
     return WithStories(config, log) if config.getvalue("dist") == "loadscope" else None
+
+
+LOAD = MachineLoad()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item) -> None:
+    """Watch the machine while real processes are tested."""
+    if item.get_closest_marker("realtime"):
+        LOAD.begin(str(item.path))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """On a machine that starves them the failure of real processes is no verdict: skipped, and told."""
+    report = yield
+    if report.failed and item.get_closest_marker("realtime"):
+        per_core = LOAD.per_core(str(item.path))
+        if per_core > STARVED_COUNT:
+            why = f"no verdict: {per_core:.0f} processes waited for each core of this machine meanwhile"
+            report.outcome, report.longrepr = "skipped", (str(item.path), item.location[1], why)
+    return report
 
 
 @pytest_asyncio.fixture
