@@ -12,6 +12,8 @@ from memories import remembering
 from structlog.testing import capture_logs
 from test_tick import ready, status
 
+from acu_daemon.assist.estimators.full.carry_over import carry_over_of
+from acu_daemon.assist.estimators.full.estimated_states import STATE_COUNT
 from acu_daemon.assist.reading_gate import ABOVE_MAX_ELEVATION, OFF_PATH
 from acu_daemon.assist.session.refit import GateVerdict, RefitReply, RefitRequest, RefitSetup
 from acu_daemon.assist.settings import EstimatorSettings
@@ -51,7 +53,9 @@ FULL = buffer(-20.0, 150.0)
 class Room:
     """A background at a clock that the test sets, with a fit process that gives what the test says."""
 
-    def __init__(self, track: TrackState = TrackState.AUTOTRACK_FITTED, sky: Sky | None = None) -> None:
+    def __init__(
+        self, track: TrackState = TrackState.AUTOTRACK_FITTED, sky: Sky | None = None, setup: RefitSetup = SETUP
+    ) -> None:
         self.now = NOW
         clock: Any = SimpleNamespace(tai_s=lambda: self.now)
         self.area = CommonArea(state=ready(track, status()), sky=sky or Sky(FULL, FIT, PLAN))
@@ -63,7 +67,7 @@ class Room:
             self.area,
             runner,
             clock,
-            SETUP,
+            setup,
             horizon_s=HORIZON_S,
             low_water_s=LOW_S,
             control=CONFIG_HERE,
@@ -335,3 +339,17 @@ def test_without_the_fit_process_the_next_buffer_is_made_from_what_the_last_one_
     assert room.background._in_force(NOW) == (None, Model.ELEMENTS)
     room.area.sky = Sky(replace(FULL, model=Model.LAST_PASS), None, PLAN)
     assert room.background._in_force(NOW) == (None, Model.ELEMENTS)  # nothing was left by a pass before
+
+
+@pytest.mark.parametrize("is_of_this_pass", [False, True])
+def test_started_again_in_a_pass_that_had_a_fit_it_begins_with_that_and_the_pass_counts_as_acquired(
+    is_of_this_pass: bool,
+) -> None:
+    fit = replace(FIT, reading_count=500, at_tai_s=NOW - 30.0, covariance=np.diag(np.full(STATE_COUNT, 1e-10)))
+    carried = carry_over_of(fit, SOURCE, WHERE)
+    assert carried is not None
+    setup = replace(SETUP, carried=replace(carried, is_of_this_pass=is_of_this_pass))
+    room = Room(sky=Sky(FULL, None, PLAN), setup=setup)
+    assert (room.area.sky.fit is not None) is is_of_this_pass
+    assert room.area.state.signal.has_acquired is is_of_this_pass
+    assert room.area.sky.prediction is FULL

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from acu_daemon.errors import ElementsError
+from acu_daemon.orbit.aging import ExpectedError, expected_error
 from acu_daemon.orbit.brouwer import BrouwerElements
 from acu_daemon.orbit.element_set import ElementSet, rad_s_from_rev_day
 from acu_daemon.orbit.elements import ElementLimits, check_brouwer, check_elements
 from acu_daemon.orbit.selection import select_elements
+from acu_daemon.orbit.sgp4_source import Sgp4Propagator
 from acu_daemon.orbit.tle import parse_tle
 from acu_daemon.units import DAY_S
 
@@ -204,3 +206,35 @@ def test_a_name_that_two_satellites_bear_is_an_error() -> None:
 def test_an_empty_list_is_an_error() -> None:
     with pytest.raises(ElementsError, match="no usable element set"):
         select_elements([], 1, None, NOW)
+
+
+@pytest.mark.parametrize("days", [0.0, 0.5, 3.0, 10.0])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_elements_are_worth_as_little_before_their_epoch_as_after_it(days: float, side: float) -> None:
+    """A fresh set is off by a kilometre, and half of one more each day; Brouwer means by their drag besides."""
+    fresh_m = 1e3 + 500.0 * days
+    without_drag = expected_error(replace(ISS, bstar_per_radius=0.0), aged(side * days))
+    assert without_drag == ExpectedError(pytest.approx(fresh_m), ISS.semi_major_axis_m)  # type: ignore[arg-type]
+    for height_km, drag_m_d2 in ((420.0, 22e3), (505.0, 22e3 / np.e), (335.0, 22e3 * np.e)):
+        a_m = 6378137.0 + 1e3 * height_km
+        means = BrouwerElements("A", NOW, a_m, 0.001, 1.0, 0.0, 0.0, 0.0)
+        assert expected_error(means, aged(side * days)).along_m == pytest.approx(
+            fresh_m + drag_m_d2 * days**2, rel=1e-4
+        )
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_the_expected_error_of_a_set_with_drag_is_half_of_what_the_drag_moves_it(side: float) -> None:
+    at = np.array([aged(side * 5.0)])
+    halved = replace(ISS, bstar_per_radius=0.5 * ISS.bstar_per_radius)
+    (one,), (other,) = (Sgp4Propagator(elements).states_teme(at)[0] for elements in (ISS, halved))
+    moved_m = float(np.linalg.norm(one - other))
+    assert moved_m > 5e3
+    assert expected_error(ISS, float(at[0])).along_m == pytest.approx(moved_m + 3.5e3, rel=0.1)
+
+
+def test_an_expected_error_is_told_in_seconds_and_in_degrees_overhead() -> None:
+    """Along a circle at 7.612 km/s, 500 km high."""
+    assert str(ExpectedError(7612.0, 6878137.0)) == "expected error about 1 s along the track, 0.87 deg overhead"
+    assert str(ExpectedError(76120.0, 6878137.0)) == "expected error about 10 s along the track, 8.7 deg overhead"
+    assert "anywhere" in str(ExpectedError(np.inf, 6878137.0))
