@@ -11,6 +11,8 @@ from memories import remembering
 from structlog.testing import capture_logs
 from test_tick import CONFIG, ready, status
 
+from acu_daemon.acu.commands import AcuMode, Command, Identify, PointAndPoll, Poll, ReadFaults, SelectMode
+from acu_daemon.acu.replies import AcuIdentity, Done, Refused
 from acu_daemon.control.orders import Event, Orders
 from acu_daemon.control.state import ControlState, StartStage
 from acu_daemon.control.tick_input import Exchange, Observation, Request, TickInput
@@ -19,24 +21,12 @@ from acu_daemon.daemon import foreground as module
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.foreground import BLIND_S, Foreground
 from acu_daemon.daemon.port import Answer
-from acu_daemon.drivers.sa3842.messages import (
-    Ack,
-    AcuMode,
-    Command,
-    Identify,
-    Identity,
-    Nak,
-    Poll,
-    ReadFaults,
-    SelectMode,
-    WriteAndPoll,
-)
 from acu_daemon.edge.clock import LoopClock
 from acu_daemon.model import Reading
 from acu_daemon.sim.virtual import run_virtual
 
 SEEN = status()
-WRITE = WriteAndPoll(100.0, 40.0)
+WRITE, KNOWN = PointAndPoll(100.0, 40.0), AcuIdentity("SA3842", True, False)
 Story = Callable[["Desk"], Any]
 
 
@@ -58,7 +48,7 @@ class ScriptedPort:
     stands_in: Command | None = None
     done: list[Any] = field(default_factory=list)
 
-    def drop_if_silent(self, _limit_s: float) -> None: ...
+    def drop_if_silent(self) -> None: ...
 
     def take_first(self) -> Answer | None:
         first, self.first = self.first, None
@@ -125,12 +115,12 @@ def told(monkeypatch: pytest.MonkeyPatch) -> Callable[[Story], None]:
 def test_what_an_exchange_brings_is_seen_by_the_next_tick_and_by_no_other(told: Callable[[Story], None]) -> None:
     async def story(desk: Desk) -> None:
         desk.orders = Orders(WRITE, ReadFaults())
-        desk.port.replies[ReadFaults()] = Ack()
+        desk.port.replies[ReadFaults()] = Done()
         assert await desk.tick() == Observation(silence_s=float("inf"))
         assert desk.port.done == [WRITE, "gap", ReadFaults()]
         desk.port.replies.clear()
         seen = await desk.tick()
-        assert (seen.status, seen.extra, seen.silence_s) == (SEEN, Exchange(ReadFaults(), Ack()), 0.07)
+        assert (seen.status, seen.extra, seen.silence_s) == (SEEN, Exchange(ReadFaults(), Done()), 0.07)
         assert seen.reading is not None
         assert (await desk.tick()).status is None
 
@@ -187,11 +177,11 @@ def test_another_connection_is_a_silence_once_unless_the_start_has_only_begun(
     ("command", "reply", "sees"),
     [
         (WRITE, SEEN, True),
-        (WRITE, Nak(), True),
+        (WRITE, Refused(), True),
         (Poll(), SEEN, True),
         (WRITE, None, False),
-        (ReadFaults(), Ack(), False),
-        (Identify(), Nak(), False),
+        (ReadFaults(), Done(), False),
+        (Identify(), Refused(), False),
     ],
 )
 def test_a_link_without_an_answer_to_a_poll_or_a_write_for_a_second_is_silent(
@@ -235,7 +225,7 @@ def test_after_a_failed_exchange_what_stands_in_for_a_poll_is_asked_and_heard_by
         desk.port.must_poll = True
         await desk.tick()
         assert desk.port.done == []
-        desk.port.stands_in, desk.port.replies = Identify(), {Identify(): Identity("SA3842", "1")}
+        desk.port.stands_in, desk.port.replies = Identify(), {Identify(): KNOWN}
         await desk.tick()
         assert desk.port.done == [Identify()]
         assert (await desk.tick()).extra is None
@@ -249,12 +239,14 @@ def test_a_refusal_is_followed_by_a_poll_at_once_and_both_are_seen(
     told: Callable[[Story], None], command: Command
 ) -> None:
     async def story(desk: Desk) -> None:
-        desk.orders, desk.port.replies[command] = Orders(command), Nak()
+        desk.orders, desk.port.replies[command] = Orders(command), Refused()
         await desk.tick()
         assert desk.port.done == [command, "gap", Poll()]
         seen = await desk.tick()
         assert seen.status == SEEN
-        assert (seen.refused, seen.extra) == ((Nak(), None) if command == WRITE else (None, Exchange(command, Nak())))
+        assert (seen.refused, seen.extra) == (
+            (Refused(), None) if command == WRITE else (None, Exchange(command, Refused()))
+        )
         assert desk.foreground.write_count == 0
 
     told(story)
@@ -282,7 +274,7 @@ def test_the_line_and_the_link_are_told_to_the_tick(told: Callable[[Story], None
 
 def test_the_answer_that_showed_the_link_to_be_up_is_the_first_status(told: Callable[[Story], None]) -> None:
     async def story(desk: Desk) -> None:
-        for reply, heard in ((Nak(), None), (SEEN, SEEN)):
+        for reply, heard in ((Refused(), None), (SEEN, SEEN)):
             desk.foreground._seen = Observation()
             desk.port.replies = {}
             desk.port.first = Answer(reply, desk.clock.tai_s(), None)
@@ -313,7 +305,7 @@ def test_a_reading_of_which_the_time_is_not_sure_is_neither_recorded_nor_fitted(
 def test_a_doubt_about_the_status_is_told_once_a_second(told: Callable[[Story], None]) -> None:
     async def story(desk: Desk) -> None:
         await desk.tick()
-        desk.port.replies[WRITE] = replace(SEEN, is_remote_enabled=False)  # which no AUTOTRACK is
+        desk.port.replies[WRITE] = replace(SEEN, contradictions=("mode and control",))
         told_s = []
         for _ in range(35):
             await asyncio.sleep(0.09)
@@ -388,7 +380,9 @@ def test_after_a_tick_that_began_more_than_half_a_period_late_the_next_one_is_sk
     told(story)
 
 
-@pytest.mark.parametrize(("reply", "hurries"), [(Identity("SA3842", "1"), True), (Nak(), False), (None, False)])
+@pytest.mark.parametrize(
+    ("reply", "hurries"), [(AcuIdentity("SA3842", True, False), True), (Refused(), False), (None, False)]
+)
 def test_the_exchanges_of_the_start_follow_each_other_in_a_tick_while_they_are_answered_and_fit(
     told: Callable[[Story], None], reply: Any, hurries: bool
 ) -> None:

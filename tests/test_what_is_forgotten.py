@@ -9,6 +9,19 @@ import test_tick
 from memories import remembering
 from test_tick import AZ_DEG, EL_DEG, FITTED, NOW, PLAN, SKY, ready, saw, status
 
+from acu_daemon.acu.commands import (
+    AcuMode,
+    Backup,
+    Command,
+    Identify,
+    ReadCommanded,
+    ReadFaults,
+    ReadTurnChoice,
+    SelectMode,
+    SetWatchdog,
+    Stop,
+)
+from acu_daemon.acu.replies import AcuIdentity, AcuStatus, Done, FaultReport
 from acu_daemon.control.extra_exchange import EXTRA_REPEAT_S
 from acu_daemon.control.safety.axis_watch import AxesWatch, AxisSeen, AxisWatch, Duty
 from acu_daemon.control.safety.encoder_watch import EncoderWatch
@@ -18,27 +31,11 @@ from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Exchange, Observation, Request, Sky, TickInput
 from acu_daemon.control.tracking.lag import LagEstimate
 from acu_daemon.control.tracking.state_table import TrackState
-from acu_daemon.drivers.sa3842.messages import (
-    Ack,
-    AcuMode,
-    Backup,
-    Command,
-    Faults,
-    Identify,
-    Identity,
-    ReadFaults,
-    ReadParameter,
-    ReadRegisters,
-    SelectMode,
-    Status,
-    Stop,
-    WriteParameter,
-)
 from acu_daemon.model import Model, Reading
 from acu_daemon.pointing.axis import AxisState
 
 CONFIG = replace(test_tick.CONFIG, register_watchdog_s=2.0)
-HOLDING = replace(status(AcuMode.REMOTE_BACKUP), are_registers_written=True)
+HOLDING = status(AcuMode.REMOTE_BACKUP)
 IN_AUTOTRACK = status()
 IN_STANDBY = status(AcuMode.STANDBY)
 
@@ -48,7 +45,7 @@ def axis(angle_deg: float, gap_deg: float, stands_s: float = 0.5) -> AxisWatch:
     return AxisWatch(AxisSeen(NOW - 0.19, angle_deg, 0.0, Duty.FOLLOW, gap_deg), 1, NOW - stands_s, angle_deg)
 
 
-def full(track: TrackState, seen: Status) -> ControlState:
+def full(track: TrackState, seen: AcuStatus) -> ControlState:
     """A memory in which no field is as at the beginning, where that can be."""
     sent = Sent(AZ_DEG, EL_DEG, is_free=False)
     return remembering(
@@ -56,9 +53,8 @@ def full(track: TrackState, seen: Status) -> ControlState:
         reading=Reading(NOW - 0.19, AZ_DEG, EL_DEG, False),
         is_place_sure=True,
         track_of_readings=tuple((NOW - 0.19 - 0.1 * k, AZ_DEG, EL_DEG) for k in range(5, -1, -1)),
-        identity=Identity("SA3842", "2.03"),
+        identity=AcuIdentity("SA3842 2.03", True, False),
         is_identity_sure=True,
-        tilt_code=77,
         present_deg=(AZ_DEG, EL_DEG),
         watchdog=Watchdog.SET,
         watchdog_from_tai_s=NOW - 1.0,
@@ -120,7 +116,7 @@ class Occasion:
     forgets: str = ""
     changes: dict[str, Any] = field(default_factory=dict)
     track: TrackState = TrackState.HOLD_FITTED
-    was: Status = HOLDING
+    was: AcuStatus = HOLDING
     before: dict[str, Any] = field(default_factory=dict)
     seen: Observation = field(default_factory=lambda: saw(HOLDING))
     sky: Sky = FITTED
@@ -135,7 +131,7 @@ def asks(command: Command) -> dict[str, Any]:
 
 
 DISARMED = {"arming.by_people": False, "startup.stage": StartStage.REGISTERS_KNOWN}
-BEGUN = {"startup.stage": StartStage.REGISTERS_KNOWN, **asks(ReadParameter("S"))}
+BEGUN = {"startup.stage": StartStage.REGISTERS_KNOWN, **asks(ReadTurnChoice())}
 ANEW = "latch.axes registers.axis_az registers.axis_el registers.was_followed startup.watchdog"
 NOT_FOLLOWED = "registers.goal_az_deg registers.was_followed"
 JUST_ASKED = {"again_tai_s": NOW + 0.2}
@@ -169,7 +165,7 @@ OCCASIONS = {
     "a person arms": Occasion(
         f"{ANEW} arming.disarmed_by foreign_stop.held arming.is_stop_due",
         BEGUN | {"arming.by_people": True},
-        before={"by_people": False, "command": ReadParameter("S"), "is_stop_due": True, **JUST_ASKED},
+        before={"by_people": False, "command": ReadTurnChoice(), "is_stop_due": True, **JUST_ASKED},
         seen=saw(HOLDING, requests=(Request.ARM,)),
     ),
     "a person arms in a fault": Occasion(
@@ -182,24 +178,24 @@ OCCASIONS = {
     ),
     "a person arms what is armed and has not begun": Occasion(
         "foreign_stop.held",
-        asks(ReadParameter("S")),
+        asks(ReadTurnChoice()),
         before={"stage": StartStage.REGISTERS_KNOWN},
         seen=saw(HOLDING, requests=(Request.ARM,)),
     ),
     "a person clears": Occasion(
         f"{ANEW} latch.problem arming.is_stop_due",
         BEGUN,
-        before={"problem": "an axis", "command": ReadParameter("S"), "is_stop_due": True, **JUST_ASKED},
+        before={"problem": "an axis", "command": ReadTurnChoice(), "is_stop_due": True, **JUST_ASKED},
         seen=saw(HOLDING, requests=(Request.CLEAR,)),
     ),
     "the ACU forgets its backup": Occasion(
         "startup.watchdog",
-        {"startup.stage": StartStage.IDENTIFIED, **asks(ReadRegisters())},
+        {"startup.stage": StartStage.IDENTIFIED, **asks(ReadCommanded())},
         seen=saw(replace(HOLDING, backup_selected=Backup.RATE)),
     ),
     "another hand stops": Occasion(
         f"latch.axes foreign_stop.held {NOT_FOLLOWED}",
-        DISARMED | goes_to(TrackState.IDLE) | asks(WriteParameter("W", 0)) | {"arming.disarmed_by": OTHERS},
+        DISARMED | goes_to(TrackState.IDLE) | asks(SetWatchdog(0.0)) | {"arming.disarmed_by": OTHERS},
         seen=saw(IN_STANDBY),
     ),
     "another hand, or the register watchdog, stops": Occasion(
@@ -277,7 +273,7 @@ OCCASIONS = {
     ),
     "no fault is there": Occasion("interlock.faults_read", before={"faults_read": (True, False, False, False)}),
     "STOP is acknowledged": Occasion(
-        "arming.is_stop_due", before={"is_stop_due": True}, seen=saw(HOLDING, extra=Exchange(Stop(), Ack()))
+        "arming.is_stop_due", before={"is_stop_due": True}, seen=saw(HOLDING, extra=Exchange(Stop(), Done()))
     ),
     "a doubted stop was the watchdog's": Occasion(
         f"foreign_stop.held foreign_stop.is_doubted {NOT_FOLLOWED}",
@@ -287,15 +283,15 @@ OCCASIONS = {
         track=TrackState.IDLE,
         was=IN_STANDBY,
         before={"is_doubted": True},
-        seen=saw(IN_STANDBY, extra=Exchange(ReadFaults(), Faults(system=2))),
+        seen=saw(IN_STANDBY, extra=Exchange(ReadFaults(), FaultReport(has_watchdog_tripped=True))),
     ),
     "a doubted stop was another hand's": Occasion(
         f"latch.axes foreign_stop.held foreign_stop.is_doubted {NOT_FOLLOWED}",
-        DISARMED | asks(WriteParameter("W", 0)) | {"arming.disarmed_by": OTHERS, "interlock.faults_read": (False,) * 4},
+        DISARMED | asks(SetWatchdog(0.0)) | {"arming.disarmed_by": OTHERS, "interlock.faults_read": (False,) * 4},
         track=TrackState.IDLE,
         was=IN_STANDBY,
         before={"is_doubted": True},
-        seen=saw(IN_STANDBY, extra=Exchange(ReadFaults(), Faults())),
+        seen=saw(IN_STANDBY, extra=Exchange(ReadFaults(), FaultReport())),
     ),
     "a doubted standby is over": Occasion("foreign_stop.is_doubted", was=IN_STANDBY, before={"is_doubted": True}),
     "all that was kept back is good again": Occasion(
