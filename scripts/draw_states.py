@@ -21,10 +21,21 @@ WIDE_COUNT = 4  # a row with more sources than this has no arrows
 BEND_RIGHT, BEND_LEFT = 0.18, 0.04  # of an arrow's length, inwards: there and back stand apart, and pass by no state
 LABEL_SHARES = [0.3 + 0.05 * k for k in range(9)]  # where along an arrow its numbers may stand
 S = TrackState
-ROUND = (S.IDLE, S.PREPOSITION, S.ACQUIRE_TLE, S.AUTOTRACK_TLE, S.AUTOTRACK_FITTED, S.HOLD_FITTED, S.SEARCH, S.HOLD_TLE)
+ROUND = (
+    S.IDLE,
+    S.PREPOSITION,
+    S.ACQUIRE_TLE,
+    S.AUTOTRACK_TLE,
+    S.AUTOTRACK_FITTED,
+    S.ZENITH,
+    S.HOLD_FITTED,
+    S.SEARCH,
+    S.HOLD_TLE,
+)
 COLOURS = {
     S.IDLE: "#555555", S.PREPOSITION: "#8a6d00", S.ACQUIRE_TLE: "#b34700", S.AUTOTRACK_TLE: "#2e7d32",
     S.AUTOTRACK_FITTED: "#006064", S.HOLD_FITTED: "#1a4fa3", S.HOLD_TLE: "#6a1b9a", S.SEARCH: "#b0003a",
+    S.ZENITH: "#5d4037",
 }  # fmt: skip
 OTHER_COLOUR = "#555555"
 NAMES: tuple[tuple[str, Set[TrackState]], ...] = (

@@ -22,7 +22,7 @@ SETTLED_S = 12.0  # acquired and fitted
 
 def zenith() -> Flight:
     """A loss from 5 s before the zenith on, with a drive that cannot follow there."""
-    target = demo_target(azimuth={"max_rate_deg_s": SLOW_DEG_S})
+    target = demo_target(azimuth={"max_rate_deg_s": SLOW_DEG_S}, tracking={"zenith_takeover": "never"})
     return flight_of(
         target,
         DEMO_TAI_S,

@@ -37,6 +37,7 @@ def control_config(
         search_s=satellite.fallback.search_s,
         search_along_s=station.tracking.search_along_s,
         search_across_deg=station.tracking.search_across_deg,
+        zenith_takeover=station.tracking.zenith_takeover,
         is_armed=station.safety.arm == "auto",
         register_watchdog_s=station.safety.register_watchdog_s if driver.capabilities.has_register_watchdog else 0.0,
         acu=driver.capabilities,

@@ -107,6 +107,14 @@ class TrackingSection(Section):
             "it begins to move."
         ),
     )
+    zenith_takeover: Literal["fitted", "always", "never"] = Field(
+        default="fitted",
+        description=(
+            "Whether the daemon takes the antenna out of autotrack where its azimuth drive cannot follow over the "
+            "zenith, leads it past, and gives it back (docs/pass-plan.md): with a fit of this pass, always, or never.  "
+            "Decides how much of an overhead pass is lost."
+        ),
+    )
     zenith_objective: Literal["largest_error", "seconds"] = Field(
         default="largest_error",
         description=(

@@ -1,11 +1,14 @@
 """Everything of the TOML files that the decision of a tick depends on."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 from acu_daemon.acu.capabilities import Capabilities
 from acu_daemon.control.safety.axis_watch import Bounds
 from acu_daemon.model import AxisLimits
 from acu_daemon.pointing.envelope import Envelope
+
+ZenithTakeover = Literal["fitted", "always", "never"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +29,7 @@ class ControlConfig:
     search_s: float = 120.0
     search_along_s: float = 10.0
     search_across_deg: float = 2.0
+    zenith_takeover: ZenithTakeover = "fitted"
     is_armed: bool = True  # at the start; later as people arm and disarm
     is_shadow: bool = False  # commands nothing, whatever happens
     is_rehearsal: bool = False  # commands nothing but an ACU that says it is simulated

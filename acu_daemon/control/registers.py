@@ -12,6 +12,7 @@ from acu_daemon.control.orders import Event
 from acu_daemon.control.state import ControlState, Sent
 from acu_daemon.control.tick_input import Observation
 from acu_daemon.control.tracking.register_limiter import Passed, limit, within_limits
+from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.model import Pointing
 
 REFUSED_PAUSE_S = 1.0  # a write that is refused again within REFUSED_AGAIN_S waits this long
@@ -168,7 +169,8 @@ def _sent(
     since_s = now_tai_s - (registers.last_write_tai_s or -math.inf)
     is_regular = abs(since_s - config.period_s) < REGULAR_SHARE * config.period_s
     is_free = is_calm and is_settled and is_regular and is_followed and registers.was_followed
-    is_free = is_free and not passed.is_held_back and not passed.limited
+    is_beside_zenith = state.tracking.track is TrackState.ZENITH  # where noise of the azimuth is many times larger
+    is_free = is_free and not passed.is_held_back and not passed.limited and not is_beside_zenith
     registers = replace(
         registers,
         axis_az=passed.az,

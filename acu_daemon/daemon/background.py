@@ -196,9 +196,7 @@ class Background:
     def _in_hand(self, now_tai_s: float) -> ZenithCrossing | None:
         """The crossing of the zenith that is gone on with, though the fit moves its path."""
         crossing = self._area.sky.prediction.crossing if self._area.sky.prediction else None
-        if crossing is None or not crossing.departure_tai_s - FROZEN_S <= now_tai_s <= crossing.return_tai_s:
-            return None
-        return crossing
+        return crossing if crossing is not None and now_tai_s >= crossing.departure_tai_s - FROZEN_S else None
 
     def _is_filled(self, now_tai_s: float, low_water_s: float) -> bool:
         """Whether the buffer holds so much ahead of now, and before it what a satellite that is late asks for."""

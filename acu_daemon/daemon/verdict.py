@@ -54,6 +54,8 @@ def verdict(seen: Snapshot) -> Verdict:
         return _before(seen)
     if state in AUTOTRACKING:
         return _tracking(seen)
+    if state is S.ZENITH:
+        return Verdict("OVER ZENITH", Level.CALM, "the azimuth drive cannot follow here: the antenna is led past it")
     return _blind(seen, state)
 
 

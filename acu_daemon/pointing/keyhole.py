@@ -105,7 +105,7 @@ def follow_path(
     best, begun_way = _search(turned, rules, int(beyond[0]), fastest), None
     if begun is not None:
         state = (np.array([begun.departure_s]), np.array([sign * begun.az_deg]), np.array([sign * begun.az_rate_deg_s]))
-        begun_way = _best(turned, rules, _ways_from(turned, rules, *state, fastest))
+        begun_way = _best(turned, rules, _ways_from(turned, rules, *state, int(beyond[0]), fastest))
     followed = _chosen(turned, rules, best, begun_way, begun)
     if followed is None:
         az, rate = _chase(path.az_deg, path.az_rate_deg_s, path.step_s, rules.azimuth)
@@ -140,7 +140,8 @@ def _search(path: SkyPath, rules: KeyholeRules, first: int, fastest: int) -> "_B
         from_s: Array = half_s * steps.astype(np.float64)
         az_deg, rate_deg_s = _interpolated(path, from_s)
         can = np.abs(rate_deg_s) <= most
-        found = _best(path, rules, _ways_from(path, rules, from_s[can], az_deg[can], rate_deg_s[can], fastest)) or found
+        ways = _ways_from(path, rules, from_s[can], az_deg[can], rate_deg_s[can], first, fastest)
+        found = _best(path, rules, ways) or found
     return found
 
 
@@ -155,9 +156,11 @@ def _interpolated(path: SkyPath, at_s: Array) -> tuple[Array, Array]:
 
 
 def _ways_from(
-    path: SkyPath, rules: KeyholeRules, from_s: Array, az_deg: Array, rate_deg_s: Array, fastest: int
+    path: SkyPath, rules: KeyholeRules, from_s: Array, az_deg: Array, rate_deg_s: Array, first: int, fastest: int
 ) -> _Ways:
     """For each departure the first return after the path has overtaken the antenna; those that have none are left out.
+
+    first, fastest: the samples at which the path leaves what the drive can do, and is fastest.
 
     In a time T an axis that begins with r0 and ends with r1 comes at most c T - ((c - r0)^2 + (c - r1)^2) / (2 A) far,
     with c the lesser of its full rate and (r0 + r1 + A T) / 2.  Where that is first as far as the path again, it meets
@@ -171,8 +174,8 @@ def _ways_from(
     r0, r1 = rate_deg_s[:, None], path.az_rate_deg_s[k]
     c = np.minimum(most, (r0 + r1 + a * time_s) / 2.0)
     ahead_deg = c * time_s - ((c - r0) ** 2 + (c - r1) ** 2) / (2.0 * a) - (path.az_deg[k] - az_deg[:, None])
-    was_behind = np.maximum.accumulate((ahead_deg < 0.0) & (time_s > 0.0), axis=1)
-    is_back = was_behind & (ahead_deg >= 0.0) & (r1 <= c) & (r0 <= c)
+    is_behind = (ahead_deg < 0.0) & (time_s > 0.0) & (k >= first)  # not what a fit has moved a way in hand beside
+    is_back = np.maximum.accumulate(is_behind, axis=1) & (ahead_deg >= 0.0) & (r1 <= c) & (r0 <= c)
     has_return = is_back.any(axis=1)
     to = k[np.argmax(is_back, axis=1)][has_return]
     from_s, az_deg, rate_deg_s = from_s[has_return], az_deg[has_return], rate_deg_s[has_return]

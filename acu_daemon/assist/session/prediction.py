@@ -34,12 +34,14 @@ def predict(
     is later; it picks the turn.  From there azimuth is continuous, through north and past the zenith.  keyhole: what
     the antenna can do that follows the registers (None: all); its path is made from lead_in_s before the start on, so
     that a buffer that starts inside the keyhole continues what the one before it planned.  in_hand: the crossing of the
-    zenith that the antenna is on, or is about to begin (pointing.keyhole).
+    zenith that the antenna is about to begin, is on, or has made (pointing.keyhole).
     fit: what corrected the propagator; its biases and its place of the station are in the prediction, and its
     covariance gives sigma_deg.
     Raises:  OrbitError: the propagator has no answer for one of the times.
     Source:  Kuga and Carrara 1990, section 4; 90 s at 10 Hz: Aguirre and Medeiros 1988, section 2.5.
     """
+    if in_hand is not None and start_tai_s - in_hand.departure_tai_s < 2.0 * lead_in_s:
+        lead_in_s = max(lead_in_s, start_tai_s - in_hand.departure_tai_s + step_s)
     before = round(lead_in_s / step_s)
     tai_s = start_tai_s + step_s * np.arange(-before, round(horizon_s / step_s) + 1, dtype=np.float64)
     seen = encoder_look(propagator, tai_s, site, fit, look_along)

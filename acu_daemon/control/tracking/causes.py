@@ -1,7 +1,7 @@
 """Which causes of a transition are present now (control.tracking.state_table has the table they drive)."""
 
 from dataclasses import replace
-from math import cos, hypot, radians
+from math import cos, hypot, inf, radians
 
 from acu_daemon.acu.commands import AcuMode
 from acu_daemon.acu.replies import AcuStatus
@@ -12,7 +12,7 @@ from acu_daemon.control.tracking.approach import ACQUIRE_LEAD_S, lead_s
 from acu_daemon.control.tracking.hills import came_out_tai_s, is_hidden
 from acu_daemon.control.tracking.pass_plan import pass_end_tai_s
 from acu_daemon.control.tracking.register_limiter import within_limits
-from acu_daemon.control.tracking.state_table import HOLDING, Cause, TrackState
+from acu_daemon.control.tracking.state_table import HOLDING, LED, Cause, TrackState
 from acu_daemon.control.tracking.track_frame import extents, is_within, offset_of
 from acu_daemon.model import Pointing, sky_angle_deg
 from acu_daemon.pointing.wrap import nearest_turn
@@ -21,6 +21,9 @@ ON_POINT_BEAMS = 0.25
 HEARD_BEAMS = 1.0  # a signal that is heard so near to the path is the satellite's
 RESUME_DEG = 5.0  # an antenna this near to the path goes on from an interruption without a new approach
 BEFORE = frozenset({TrackState.IDLE, TrackState.PREPOSITION})  # only there it matters where the antenna stands
+TAKEOVER_S, GIVE_BACK_S = 2.0, 0.5  # before the departure, and after the return: a crossing of the zenith
+CHANGED_S = 3.0  # by which a fit may put off a crossing that the antenna was taken over for
+TAKEOVER_RATES = 1.2  # of the drive's rate: what autotrack cannot follow
 MODE_SETTLE_S = 3.0  # a selected mode takes a moment to show; only later is a left mode the ACU's own doing
 
 
@@ -38,7 +41,29 @@ def find_causes(state: ControlState, given: TickInput, config: ControlConfig) ->
         causes |= _of_signal(state, status, given, config)
         causes |= _of_plan(state, status, given, config)
         causes |= _of_time(state, status, given, config)
+        causes |= _of_zenith(state, given, config)
     return causes
+
+
+def _of_zenith(state: ControlState, given: TickInput, config: ControlConfig) -> set[Cause]:
+    """Whether the antenna is to be led past the zenith, because its azimuth drive cannot follow there, or is past it.
+
+    Autotrack would follow until after culmination, too late for any way; and a signal that is heard on the way would
+    catch an antenna that is only backed up.
+    """
+    sky, now_tai_s = given.sky, given.now_tai_s
+    crossing = sky.prediction.crossing if sky.prediction is not None else None
+    begin_tai_s, end_tai_s = inf, -inf
+    if crossing is not None:
+        begin_tai_s, end_tai_s = crossing.departure_tai_s - TAKEOVER_S, crossing.return_tai_s + GIVE_BACK_S
+    if state.tracking.track is TrackState.ZENITH:
+        past = Cause.ZENITH_PAST_FITTED if sky.is_fitted else Cause.ZENITH_PAST
+        return set() if begin_tai_s - CHANGED_S <= now_tai_s < end_tai_s else {past}
+    if crossing is None or not begin_tai_s <= now_tai_s < end_tai_s - 2.0 * GIVE_BACK_S:
+        return set()
+    may_take = config.zenith_takeover == "always" or (config.zenith_takeover == "fitted" and sky.is_fitted)
+    is_too_fast = crossing.peak_rate_deg_s > TAKEOVER_RATES * config.azimuth.max_rate_deg_s
+    return {Cause.ZENITH_NEAR} if may_take and is_too_fast else set()
 
 
 def _of_others(state: ControlState, status: AcuStatus, given: TickInput, config: ControlConfig) -> set[Cause]:
@@ -167,7 +192,8 @@ def _of_time(state: ControlState, status: AcuStatus, given: TickInput, config: C
     sky, now_tai_s, track = given.sky, given.now_tai_s, state.tracking.track
     in_state_s = now_tai_s - state.tracking.entered_tai_s
     causes: set[Cause] = set()
-    is_left = not status.is_autotrack_selected and status.mode in (AcuMode.STANDBY, AcuMode.REMOTE)
+    is_led = track in LED and status.mode is AcuMode.REMOTE
+    is_left = not status.is_autotrack_selected and status.mode in (AcuMode.STANDBY, AcuMode.REMOTE) and not is_led
     if is_left and in_state_s > MODE_SETTLE_S:
         causes.add(Cause.MODE_LEFT)
     if track is TrackState.ACQUIRE_TLE and sky.plan is not None:

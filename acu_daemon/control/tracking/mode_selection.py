@@ -2,7 +2,7 @@
 
 from acu_daemon.acu.commands import AcuMode, Backup, Command, SelectBackup, SelectMode
 from acu_daemon.control.state import ControlState
-from acu_daemon.control.tracking.state_table import AUTOTRACKING, HOLDING, TrackState
+from acu_daemon.control.tracking.state_table import AUTOTRACKING, HOLDING, LED, TrackState
 
 STANDBY = SelectMode(AcuMode.STANDBY)  # the one mode command that the ACU takes in STOWED: docs/adding-an-acu.md, Modes
 UNDER_AUTOTRACK = AUTOTRACKING | HOLDING | {TrackState.ACQUIRE_TLE, TrackState.SEARCH}
@@ -17,13 +17,13 @@ def wanted_mode_command(state: ControlState, *, is_settled: bool) -> Command | N
     status = state.intake.status
     if status is None:
         return None
-    if state.tracking.track is not TrackState.PREPOSITION and state.tracking.track not in UNDER_AUTOTRACK:
+    if state.tracking.track not in LED | UNDER_AUTOTRACK:
         return None
     is_stuck = status.mode is AcuMode.STANDBY and status.is_autotrack_selected  # selected again, it would not change
     if status.mode is AcuMode.STOWED or (is_stuck and is_settled):
         return STANDBY
     if status.backup_selected is not Backup.REMOTE:
         return SelectBackup(Backup.REMOTE)
-    if state.tracking.track is TrackState.PREPOSITION:
+    if state.tracking.track in LED:
         return SelectMode(AcuMode.REMOTE) if status.mode is not AcuMode.REMOTE else None
     return SelectMode(AcuMode.AUTOTRACK) if not status.is_autotrack_selected else None

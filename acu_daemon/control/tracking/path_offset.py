@@ -91,6 +91,6 @@ def learned_point(state: ControlState, sky: Sky, tai_s: float, *, follow: bool) 
     offset, prediction = state.signal.offset, sky.prediction
     if offset is None or prediction is None or offset.model is not prediction.model:
         return None
-    if state.tracking.track not in (TrackState.AUTOTRACK_TLE, TrackState.HOLD_TLE):
+    if state.tracking.track not in (TrackState.AUTOTRACK_TLE, TrackState.HOLD_TLE, TrackState.ZENITH):
         return None
     return beside(prediction, tai_s, (offset.along_s, offset.across_deg), follow=follow)

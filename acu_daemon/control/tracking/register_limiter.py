@@ -18,10 +18,11 @@ from acu_daemon.pointing.axis import AxisState, step
 from acu_daemon.pointing.wrap import nearest_end_deg
 
 LIMIT_SLACK_DEG = 0.1  # noise of a reading at a limit is clamped without a word
-PATH_MARGIN = 0.98  # of the drive's limits, on the path: the time between two writes is only nominally the period
+PATH_MARGIN = 1.0  # of the drive's limits, on the path: a way past the zenith takes 0.98 of them (pointing.keyhole)
 NEAR_DEG, NEAR_DEG_S = 0.5, 2.0  # nearer than this to the path in angle and rate is on it
 CHASE_RATE_MARGIN = 0.9  # while it chases the path: an antenna that fell behind must be able to catch up,
 CHASE_ACCELERATION_MARGIN = 0.6  # and must not stay behind its registers all the way (decision 0020)
+CATCH_UP_SHARE = 0.02  # of the drive's rate: more than a path takes
 ENTRY_S = 1.2  # where the satellite enters the beam, autotrack takes over: half a beam in no less time than this
 STRAY_DEG = 0.5  # an antenna this far from the register it is about to follow starts from where it is
 WINDUP_DEG = 10.0  # a followed register may lead the antenna by this and WINDUP_S of the motion, then it waits
@@ -159,7 +160,9 @@ def _reachable(start: AxisState, wanted: AxisState, dt_s: float, limits: AxisLim
         return reached
     gap_deg = wanted.position_deg - wanted.rate_deg_s * dt_s - start.position_deg  # both at the start of the step
     is_leaving = (start.rate_deg_s - wanted.rate_deg_s) * gap_deg < 0.0
-    chase = _share(limits, CHASE_RATE_MARGIN, PATH_MARGIN if is_leaving else CHASE_ACCELERATION_MARGIN)
+    fast = round(min(abs(wanted.rate_deg_s) / limits.max_rate_deg_s + CATCH_UP_SHARE, PATH_MARGIN), 2)
+    chase_rate = max(CHASE_RATE_MARGIN, fast)  # on a way past the zenith the path itself takes nearly all
+    chase = _share(limits, chase_rate, PATH_MARGIN if is_leaving else CHASE_ACCELERATION_MARGIN)
     aim_deg = wanted.position_deg
     if abs(gap_deg) > half_beam_deg:
         aim_deg -= copysign(_short_deg(half_beam_deg, chase.max_acceleration_deg_s2), gap_deg)

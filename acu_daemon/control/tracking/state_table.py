@@ -20,6 +20,7 @@ class TrackState(StrEnum):
     HOLD_FITTED = "HOLD/FITTED"
     HOLD_TLE = "HOLD/TLE"
     SEARCH = "SEARCH"
+    ZENITH = "ZENITH"
     MANUAL = "MANUAL"
     STOW = "STOW"
     FAULT = "FAULT"
@@ -55,17 +56,24 @@ class Cause(StrEnum):
     MODE_LEFT = "the ACU left the mode by itself (power cycle, or another hand)"
     ACQUIRE_OVER = "no signal within acquire_s"
     HOLD_OVER = "no signal within hold_s"
+    ZENITH_NEAR = "the azimuth drive cannot follow over the zenith: the antenna is led past it"
+    ZENITH_PAST = "the antenna is past the zenith"
+    ZENITH_PAST_FITTED = "the antenna is past the zenith, on the path of this pass's fit"
     SEARCH_OVER = "no signal within search_s"
     SEARCH_OVER_FITTED = "no signal within search_s around this pass's fit"
 
 
 S = TrackState
 ACTIVE = frozenset(
-    {S.PREPOSITION, S.ACQUIRE_TLE, S.AUTOTRACK_TLE, S.AUTOTRACK_FITTED, S.HOLD_FITTED, S.HOLD_TLE, S.SEARCH}
+    {
+        S.PREPOSITION,
+        *(S.ACQUIRE_TLE, S.AUTOTRACK_TLE, S.AUTOTRACK_FITTED, S.HOLD_FITTED, S.HOLD_TLE, S.SEARCH, S.ZENITH),
+    }
 )
 TRACKING = ACTIVE - {S.PREPOSITION}
 HOLDING = frozenset({S.HOLD_FITTED, S.HOLD_TLE})
 AUTOTRACKING = frozenset({S.AUTOTRACK_TLE, S.AUTOTRACK_FITTED})
+LED = frozenset({S.PREPOSITION, S.ZENITH})  # by the registers alone: autotrack is not selected
 ANY = frozenset(TrackState)
 NO_LINK = frozenset({S.LINK_LOST})
 
@@ -105,6 +113,9 @@ TABLE: tuple[Row, ...] = (
     Row(frozenset({S.PREPOSITION}), Cause.ON_POINT_FITTED, S.HOLD_FITTED),
     Row(frozenset({S.PREPOSITION}), Cause.ON_POINT, S.ACQUIRE_TLE, "20 s before the rise or later"),
     Row(TRACKING, Cause.MODE_LEFT, S.IDLE),
+    Row(AUTOTRACKING | HOLDING | {S.ACQUIRE_TLE}, Cause.ZENITH_NEAR, S.ZENITH, "2 s before the departure"),
+    Row(frozenset({S.ZENITH}), Cause.ZENITH_PAST_FITTED, S.HOLD_FITTED, "0.5 s after the return"),
+    Row(frozenset({S.ZENITH}), Cause.ZENITH_PAST, S.HOLD_TLE, "0.5 s after the return"),
     Row(frozenset({S.AUTOTRACK_FITTED}), Cause.FIT_LEFT, S.AUTOTRACK_TLE),
     Row(frozenset({S.HOLD_FITTED}), Cause.FIT_LEFT, S.HOLD_TLE),
     Row(frozenset({S.ACQUIRE_TLE, S.SEARCH}), Cause.ACQUIRED_FITTED, S.AUTOTRACK_FITTED),
