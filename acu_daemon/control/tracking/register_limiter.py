@@ -19,6 +19,7 @@ from acu_daemon.pointing.wrap import nearest_end_deg
 
 LIMIT_SLACK_DEG = 0.1  # noise of a reading at a limit is clamped without a word
 PATH_MARGIN = 1.0  # of the drive's limits, on the path: a way past the zenith takes 0.98 of them (pointing.keyhole)
+BRAKING_MARGIN = 0.98  # of an axis that moves away from its path
 NEAR_DEG, NEAR_DEG_S = 0.5, 2.0  # nearer than this to the path in angle and rate is on it
 CHASE_RATE_MARGIN = 0.9  # while it chases the path: an antenna that fell behind must be able to catch up,
 CHASE_ACCELERATION_MARGIN = 0.6  # and must not stay behind its registers all the way (decision 0020)
@@ -162,7 +163,7 @@ def _reachable(start: AxisState, wanted: AxisState, dt_s: float, limits: AxisLim
     is_leaving = (start.rate_deg_s - wanted.rate_deg_s) * gap_deg < 0.0
     fast = round(min(abs(wanted.rate_deg_s) / limits.max_rate_deg_s + CATCH_UP_SHARE, PATH_MARGIN), 2)
     chase_rate = max(CHASE_RATE_MARGIN, fast)  # on a way past the zenith the path itself takes nearly all
-    chase = _share(limits, chase_rate, PATH_MARGIN if is_leaving else CHASE_ACCELERATION_MARGIN)
+    chase = _share(limits, chase_rate, BRAKING_MARGIN if is_leaving else CHASE_ACCELERATION_MARGIN)
     aim_deg = wanted.position_deg
     if abs(gap_deg) > half_beam_deg:
         aim_deg -= copysign(_short_deg(half_beam_deg, chase.max_acceleration_deg_s2), gap_deg)
