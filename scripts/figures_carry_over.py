@@ -3,10 +3,12 @@
 
     .venv/bin/python scripts/figures_carry_over.py                 the table (under a minute)
     .venv/bin/python scripts/figures_carry_over.py --along-s 12    the same with elements that many seconds wrong
+    .venv/bin/python scripts/figures_carry_over.py --vacuum        without air
     .venv/bin/python scripts/figures_carry_over.py --json FILE     the figures as JSON too
 
 The first pass is read at 1 Hz with 0.03 deg noise and fitted by `full`; its fit, aged, begins the second pass, days
-later and over another station, so that only the orbit's part is carried.  Angles on the sky between prediction and
+later and over another station, so that only the orbit's part is carried.  Both are seen in the simulator's air, the
+refractivity of each drawn within +-10 % of what is told.  Angles on the sky between prediction and
 truth, deg, medians over the runs: at AOS before any reading, worst over the pass without any reading, worst over the
 rest after 30 s of lock.
 """
@@ -18,6 +20,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from real_pass import pass_names
+from tables.air import seen_in_air, with_scale
 from tables.outputs import output_file
 from tables.seed_001 import sky_angles_deg
 from tables.skies import Sky, readings_of, real_elements, real_sky
@@ -71,7 +74,7 @@ def errors_deg(source: Sgp4Propagator, real: Sky, fit: FitResult | None) -> Arra
 
 def fitted(source: Sgp4Propagator, site: Site, readings: Readings, carried: CarryOver | None = None) -> FitResult:
     """The fit of `full`."""
-    estimator = FullEstimator(source, site, SETTINGS, carried)
+    estimator = FullEstimator(source, site, with_scale(SETTINGS, site), carried)
     estimator.add(readings)
     fit = estimator.fit()
     if fit is None or estimator.notes:
@@ -100,9 +103,10 @@ def one_run(source: Sgp4Propagator, first: Sky, second: Sky, seed: int) -> tuple
         fitted(source, first.site, readings_of(first, AngleBias(), NOISE_DEG, rng)), source, first.site
     )
     aos_tai_s = float(second.tai_s[0])
-    if carried is None or why_not(carried, source, SETTINGS, aos_tai_s):
+    settings = with_scale(SETTINGS, second.site)
+    if carried is None or why_not(carried, source, settings, aos_tai_s):
         raise ValueError(f"{first.name}: nothing to carry over")
-    start = first_fit(carried, aged_prior(carried, source, second.site, SETTINGS, aos_tai_s))
+    start = first_fit(carried, aged_prior(carried, source, second.site, settings, aos_tai_s))
     sigmas = [start_sigma_deg(source, second, one) for one in (start, orbit_alone(start))]
     all_readings = readings_of(second, AngleBias(), NOISE_DEG, rng)
     few = all_readings.part(slice(LOCK_S))
@@ -127,9 +131,13 @@ def pairs() -> list[tuple[str, str, str]]:
     return found
 
 
-def row_of(first_name: str, second_name: str, elements: str, along_s: float, run_count: int) -> Row:
+def row_of(
+    first_name: str, second_name: str, elements: str, along_s: float, run_count: int, has_air: bool = True
+) -> Row:
     """Medians over the runs."""
     source, first, second = source_of(elements, along_s), real_sky(first_name), real_sky(second_name)
+    if has_air:
+        first, second = (seen_in_air(sky, sum(sky.name.encode())) for sky in (first, second))
     runs = np.median([one_run(source, first, second, seed) for seed in range(run_count)], axis=0).tolist()
     sigma, orbit_sigma, plain_aos, plain_worst, plain_after, carried_aos, carried_worst, carried_after = runs
     return Row(
@@ -154,6 +162,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--along-s", type=float, default=0.0, help="seconds that the elements are made wrong")
     parser.add_argument("--runs", type=int, default=10, help="runs with other noise; default 10")
+    parser.add_argument("--vacuum", action="store_true", help="without air")
     parser.add_argument("--json", type=output_file, help="write the figures here")
     chosen = parser.parse_args()
     if not pairs():
@@ -165,7 +174,7 @@ def main() -> int:
     )
     rows = []
     for first, second, elements in pairs():
-        row = row_of(first, second, elements, chosen.along_s, chosen.runs)
+        row = row_of(first, second, elements, chosen.along_s, chosen.runs, not chosen.vacuum)
         rows.append(row)
         label = f"{first.rsplit('-', 1)[0]}, {second.rsplit('-', 2)[1]}"
         print(

@@ -4,11 +4,13 @@
     .venv/bin/python scripts/gate_figures.py                    the table (some minutes)
     .venv/bin/python scripts/gate_figures.py --only hunting     the kinds with that word in their name
     .venv/bin/python scripts/gate_figures.py --first-locks      first locks on a side lobe, without AGC
+    .venv/bin/python scripts/gate_figures.py --vacuum           without air
 
 A minute of lock, a bad minute, and a prediction of the rest of the pass, 300 s at most.  Change: the largest angle
 between that prediction and the daemon's from the good minute alone.  Without the gate all readings go to `full`, whose
 robust weights are all that is left.  Right: the share of the bad readings left out for the reason expected; good lost:
-the share of the good ones left out, 20 s after the bad minute among them.
+the share of the good ones left out, 20 s after the bad minute among them.  The passes are seen in the simulator's air,
+the refractivity of each drawn within +-10 % of what is told.
 """
 
 import argparse
@@ -17,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from real_pass import truth_path
+from tables.air import DRAWN, told_air, with_scale
 from tables.skies import real_elements, real_sky
 from tables.workers import run_script
 
@@ -37,7 +40,9 @@ from acu_daemon.assist.session.refit import RefitRequest, RefitSetup, Refitter
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import AxisLimits, FitResult, Reading, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
-from acu_daemon.sim.sky import DirectionTable, read_truth
+from acu_daemon.pointing.air import standard_air
+from acu_daemon.sim.apparent_sky import ApparentSky, make_air
+from acu_daemon.sim.sky import SimulatedSky, read_truth
 from acu_daemon.units import Array
 
 NOISE_DEG = 0.03
@@ -108,11 +113,23 @@ class Place:
 
     source: Propagator
     site: Site
-    sky: DirectionTable
+    sky: SimulatedSky  # as the antenna meets it
+    start_tai_s: float
+    end_tai_s: float
 
     @classmethod
-    def of(cls, name: str) -> "Place":
-        return cls(real_elements(name), real_sky(name).site, read_truth(truth_path(name)))
+    def of(cls, name: str, has_air: bool = True) -> "Place":
+        table, site = read_truth(truth_path(name)), real_sky(name).site
+        sky: SimulatedSky = table
+        if has_air:
+            height_m, drawn_by = site.station.height_m, sum(name.encode())
+            sky = ApparentSky(table, make_air(standard_air(site.station), DRAWN, height_m, drawn_by))
+            site = told_air(site)
+        return cls(real_elements(name), site, sky, table.start_tai_s, table.end_tai_s)
+
+    @property
+    def settings(self) -> EstimatorSettings:
+        return with_scale(SETTINGS, self.site)
 
     def truth(self, tai_s: Array) -> tuple[Array, Array]:
         seen = [self.sky.direction(float(t)) or (np.nan, np.nan, np.nan) for t in tai_s]
@@ -134,7 +151,7 @@ class Figures:
 def minutes(place: Place, hz: float, kind: Kind, seed: int, begin_s: float) -> tuple[Readings, Array]:
     """A good minute, a bad one and some seconds more, and the seconds since the bad one began."""
     rng = np.random.default_rng(seed)
-    tai_s = place.sky.start_tai_s + begin_s + np.arange(0.0, LOCK_S + BAD_S + AFTER_S, 1.0 / hz)
+    tai_s = place.start_tai_s + begin_s + np.arange(0.0, LOCK_S + BAD_S + AFTER_S, 1.0 / hz)
     az_deg, el_deg = place.truth(tai_s)
     t = tai_s - tai_s[0] - LOCK_S
     is_bad = (t >= 0.0) & (t < BAD_S)
@@ -150,11 +167,11 @@ def settings_of(kind: Kind, place: Place, at_tai_s: float) -> EstimatorSettings:
     """The usual ones; a limit that the path passes at the beginning of the bad minute where the kind is about one."""
     az_deg, el_deg = place.truth(at_tai_s + np.array([-1.0, 0.0, 1.0]))
     if kind.reason == ABOVE_MAX_ELEVATION:
-        return replace(SETTINGS, max_fit_elevation_deg=float(el_deg[1]))
+        return replace(place.settings, max_fit_elevation_deg=float(el_deg[1]))
     if kind.reason == ACCELERATION and kind.spoil(np.zeros(1))[1] == 0.0:
         limit_deg_s2 = float(abs(np.diff(np.unwrap(az_deg, period=360.0), 2)[0])) / 0.3
-        return replace(SETTINGS, azimuth=replace(AZIMUTH, max_acceleration_deg_s2=limit_deg_s2))
-    return SETTINGS
+        return replace(place.settings, azimuth=replace(AZIMUTH, max_acceleration_deg_s2=limit_deg_s2))
+    return place.settings
 
 
 def locks(readings: Readings, t: Array, dwell_s: float) -> tuple[Readings, Readings]:
@@ -182,7 +199,7 @@ def fitted(refitter: Refitter, place: Place, at_tai_s: float) -> tuple[FitResult
 
 
 def plain(place: Place, readings: Readings) -> FitResult | None:
-    estimator = FullEstimator(place.source, place.site, SETTINGS)
+    estimator = FullEstimator(place.source, place.site, place.settings)
     estimator.add(readings)
     return estimator.fit()
 
@@ -207,7 +224,7 @@ def measure(place: Place, kind: Kind, hz: float, seed: int) -> Figures:
     settings = settings_of(kind, place, float(readings.tai_s[0]) + LOCK_S)
     before, bad, after = t < 0.0, (t >= 0.0) & (t < BAD_S), t >= BAD_S
     end_tai_s = float(readings.tai_s[bad][-1])
-    ahead_tai_s = np.arange(end_tai_s, min(end_tai_s + AHEAD_S, place.sky.end_tai_s - 1.0), 5.0)
+    ahead_tai_s = np.arange(end_tai_s, min(end_tai_s + AHEAD_S, place.end_tai_s - 1.0), 5.0)
     offered, dwelt_count, seen = readings, 0, readings.part(~after)
     if kind.dwell_s:
         offered, acquired = locks(readings, t, kind.dwell_s)
@@ -219,7 +236,7 @@ def measure(place: Place, kind: Kind, hz: float, seed: int) -> Figures:
     counts[DWELL] = dwelt_count
     bad_count = dwelt_count if kind.dwell_s else int(np.count_nonzero(bad))
     _, after_counts = fitted(gated(place, offered, settings), place, float(readings.tai_s[-1]))
-    is_limit = settings is not SETTINGS  # what comes after the bad minute is beyond the limit too, and rightly left out
+    is_limit = settings != place.settings  # what comes after the bad minute is beyond it too, and rightly left out
     lost = max(sum(after_counts.values()) - int(np.count_nonzero(bad)), 0)
     return Figures(
         gated_deg=apart_deg(place, fit, reference, ahead_tai_s),
@@ -230,9 +247,9 @@ def measure(place: Place, kind: Kind, hz: float, seed: int) -> Figures:
     )
 
 
-def bad_minutes(word: str, runs: int) -> Iterator[str]:
+def bad_minutes(word: str, runs: int, has_air: bool) -> Iterator[str]:
     """Lines of the table."""
-    places = [Place.of(name) for name in PASSES]
+    places = [Place.of(name, has_air) for name in PASSES]
     yield f"{len(places)} passes x {runs} runs: median / worst change of the prediction, deg; shares of readings"
     yield ""
     yield "| a minute of | Hz | with the gate | without | right reason | left out | good lost |"
@@ -249,20 +266,24 @@ def bad_minutes(word: str, runs: int) -> Iterator[str]:
             )
 
 
-def first_locks(seconds: tuple[float, ...] = (10.0, 20.0, 40.0, 80.0)) -> Iterator[str]:
+def first_locks(has_air: bool, seconds: tuple[float, ...] = (10.0, 20.0, 40.0, 80.0)) -> Iterator[str]:
     """Lines of the table of first locks on a side lobe for a minute: prediction's error after so much main lobe."""
+    place = Place.of(PASSES[0], has_air)
     yield "| first lock, deg right / up | " + " | ".join(f"after {s:g} s" for s in seconds) + " |"
     yield "|---" * (len(seconds) + 1) + "|"
     for beams in (1.2, 1.5, 2.0):
         for angle in range(0, 360, 60):
             right_deg, up_deg = beams * np.cos(np.radians(angle)), beams * np.sin(np.radians(angle))
-            yield f"| {right_deg:+.1f} / {up_deg:+.1f} | " + " | ".join(_first_lock(right_deg, up_deg, seconds)) + " |"
+            yield (
+                f"| {right_deg:+.1f} / {up_deg:+.1f} | "
+                + " | ".join(_first_lock(place, right_deg, up_deg, seconds))
+                + " |"
+            )
 
 
-def _first_lock(right_deg: float, up_deg: float, seconds: tuple[float, ...]) -> Iterator[str]:
-    place = Place.of(PASSES[0])
+def _first_lock(place: Place, right_deg: float, up_deg: float, seconds: tuple[float, ...]) -> Iterator[str]:
     rng = np.random.default_rng(1)
-    tai_s = place.sky.start_tai_s + BEGIN_S + np.arange(0.0, BAD_S + max(seconds), 0.5)
+    tai_s = place.start_tai_s + BEGIN_S + np.arange(0.0, BAD_S + max(seconds), 0.5)
     az_deg, el_deg = place.truth(tai_s)
     is_bad = tai_s < tai_s[0] + BAD_S
     noise_deg = NOISE_DEG * rng.standard_normal((2, tai_s.size))
@@ -270,7 +291,7 @@ def _first_lock(right_deg: float, up_deg: float, seconds: tuple[float, ...]) -> 
     readings = Readings(tai_s, (az_deg + right / np.cos(np.radians(el_deg))) % 360.0, el_deg + up)
     for after_s in seconds:
         now_tai_s = tai_s[0] + BAD_S + after_s
-        refitter = gated(place, readings.part(tai_s < now_tai_s), SETTINGS)
+        refitter = gated(place, readings.part(tai_s < now_tai_s), place.settings)
         fit, _ = fitted(refitter, place, now_tai_s)
         ahead = now_tai_s + np.arange(0.0, 60.0, 5.0)
         az, el = np.radians(place.truth(ahead))
@@ -284,8 +305,10 @@ def main() -> int:
     parser.add_argument("--only", default="", metavar="WORD", help="the kinds with that word in their name")
     parser.add_argument("--runs", type=int, default=2, metavar="N", help="noises for each pass (default %(default)s)")
     parser.add_argument("--first-locks", action="store_true", help="first locks on a side lobe in place of bad minutes")
+    parser.add_argument("--vacuum", action="store_true", help="without air")
     asked = parser.parse_args()
-    for line in first_locks() if asked.first_locks else bad_minutes(asked.only, asked.runs):
+    has_air = not asked.vacuum
+    for line in first_locks(has_air) if asked.first_locks else bad_minutes(asked.only, asked.runs, has_air):
         print(line, flush=True)
     return 0
 

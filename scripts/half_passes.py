@@ -3,12 +3,14 @@
 
     .venv/bin/python scripts/half_passes.py                every table (2 to 3 minutes on two cores)
     .venv/bin/python scripts/half_passes.py --draws 3      fewer draws of the noise, sooner
+    .venv/bin/python scripts/half_passes.py --vacuum       without air
     .venv/bin/python scripts/half_passes.py --json FILE    the figures as JSON too
     .venv/bin/python scripts/half_passes.py --plot FILE    the worst error of every real pass as a picture (PNG)
 
 Read at 1 Hz with 0.03 deg noise (across the elevation, and in elevation), default a-priori sigmas; angles on the sky in
-the encoder frame: the real passes of ../shared/data, and passes of listed low orbits.  The papers' simulation is run
-for the ellipses alone; it needs brahe (pip install 'acu-daemon[accuracy]') and is left out without it.
+the encoder frame: the real passes of ../shared/data, and passes of listed low orbits, in the simulator's air whose
+refractivity is drawn within +-10 % of what is told.  The papers' simulation, which has no air, is run for the ellipses
+alone; it needs brahe (pip install 'acu-daemon[accuracy]') and is left out without it.
 """
 
 import argparse
@@ -20,6 +22,7 @@ from importlib.util import find_spec
 
 import numpy as np
 from real_pass import pass_names
+from tables.air import seen_in_air, with_scale
 from tables.charts_half_passes import plot_passes
 from tables.console import progress, say
 from tables.errors_put_in import azimuth_model_deg, corrupted_state, draw_errors, elevation_model_deg, readings_with
@@ -99,24 +102,29 @@ def shown_of(sky: Sky, bias: AngleBias) -> Readings:
 def one_trial(source: Propagator, sky: Sky, bias: AngleBias, used: int, rng: np.random.Generator) -> Trial:
     """Read a sky with noise, fit, judge."""
     readings = readings_of(sky, bias, NOISE_DEG, rng)
-    return tried(sky.name, source, sky.site, SETTINGS, shown_of(sky, bias), readings, used)
+    settings = with_scale(SETTINGS, sky.site)
+    return tried(sky.name, source, sky.site, settings, shown_of(sky, bias), readings, used)
 
 
-def real_trials(name: str, bias: AngleBias, lock_s: int | None, wrong_deg: float, draws: int) -> list[Trial]:
-    """A real pass with other noise each time, its first half read, or the first so many seconds."""
+def real_trials(
+    name: str, bias: AngleBias, lock_s: int | None, wrong_deg: float, draws: int, has_air: bool = True
+) -> list[Trial]:
+    """A real pass with other noise and air each time, its first half read, or the first so many seconds."""
     sky, source = real_sky(name), real_elements(name, wrong_deg)
     used = lock_s or sky.tai_s.size // 2
-    return [one_trial(source, sky, bias, used, np.random.default_rng(seed)) for seed in range(draws)]
+    skies = [seen_in_air(sky, seed) if has_air else sky for seed in range(draws)]
+    return [one_trial(source, sky, bias, used, np.random.default_rng(seed)) for seed, sky in enumerate(skies)]
 
 
-def listed_trials(wrong: Wrong, seed: np.random.SeedSequence) -> list[Trial]:
+def listed_trials(wrong: Wrong, seed: np.random.SeedSequence, has_air: bool = True) -> list[Trial]:
     """Some listed passes, each with a bias drawn from its a-priori sigma where the orbit's error is too."""
     rng = np.random.default_rng(seed)
     trials = []
     for source, sky in listed_passes(wrong, CHUNK, rng):
         az, el = (rng.standard_normal(2) * SETTINGS.bias_sigma_azimuth_deg).tolist()
         bias = AngleBias(az_deg=az, el_deg=el) if wrong is as_assumed else BIASED
-        trials.append(one_trial(source, sky, bias, sky.tai_s.size // 2, rng))
+        shown = seen_in_air(sky, int(rng.integers(2**31))) if has_air else sky
+        trials.append(one_trial(source, shown, bias, sky.tai_s.size // 2, rng))
     return trials
 
 
@@ -143,30 +151,29 @@ def true_pass_of(one: SeedPass) -> TruePass:
     return true_passes([one])[0]
 
 
-def real_jobs(draws: int) -> list[tuple[str, Work]]:
+def real_jobs(draws: int, has_air: bool) -> list[tuple[str, Work]]:
     """What is done with every real pass."""
     jobs: list[tuple[str, Work]] = []
     for name in pass_names():
-        jobs.append((HALF, partial(real_trials, name, NONE, None, 0.0, draws)))
-        jobs.append((HALF_BIASED, partial(real_trials, name, BIASED, None, 0.0, draws)))
-        jobs.append((f"real, {LOCK_S} s", partial(real_trials, name, NONE, LOCK_S, 0.0, draws)))
-        jobs.append((f"real, {LOCK_S} s, bias", partial(real_trials, name, BIASED, LOCK_S, 0.0, draws)))
+        jobs.append((HALF, partial(real_trials, name, NONE, None, 0.0, draws, has_air)))
+        jobs.append((HALF_BIASED, partial(real_trials, name, BIASED, None, 0.0, draws, has_air)))
+        jobs.append((f"real, {LOCK_S} s", partial(real_trials, name, NONE, LOCK_S, 0.0, draws, has_air)))
+        jobs.append((f"real, {LOCK_S} s, bias", partial(real_trials, name, BIASED, LOCK_S, 0.0, draws, has_air)))
         for wrong_deg in (-1.0, 1.0):
-            jobs.append(("real, half, bias, M 1 deg off", partial(real_trials, name, BIASED, None, wrong_deg, draws)))
-            jobs.append(
-                (f"real, {LOCK_S} s, bias, M 1 deg off", partial(real_trials, name, BIASED, LOCK_S, wrong_deg, draws))
-            )
+            for label, lock_s in (("half", None), (f"{LOCK_S} s", LOCK_S)):
+                work = partial(real_trials, name, BIASED, lock_s, wrong_deg, draws, has_air)
+                jobs.append((f"real, {label}, bias, M 1 deg off", work))
     return jobs
 
 
-def all_trials(draws: int, listed_count: int) -> dict[str, list[Trial]]:
+def all_trials(draws: int, listed_count: int, has_air: bool) -> dict[str, list[Trial]]:
     """Do everything, on all cores; the same figures however many there are."""
-    jobs = real_jobs(draws)
+    jobs = real_jobs(draws, has_air)
     for (label, wrong), seed in zip(LISTED.items(), np.random.SeedSequence(SEED).spawn(len(LISTED)), strict=True):
-        jobs += [(label, partial(listed_trials, wrong, one)) for one in seed.spawn(listed_count // CHUNK)]
-    if find_spec("brahe") is None:
+        jobs += [(label, partial(listed_trials, wrong, one, has_air)) for one in seed.spawn(listed_count // CHUNK)]
+    if listed_count and find_spec("brahe") is None:
         say("the papers' simulation is left out: it needs brahe, pip install -c constraints.txt '.[accuracy]'")
-    else:
+    elif listed_count:
         for true_pass in results_of(run_campaign(true_pass_of, PASSES)):
             jobs += [(label, partial(papers_trials, true_pass, *station, draws)) for label, station in STATIONS.items()]
     trials = results_of(run_campaign(_done, jobs, name_of=lambda job: job[0], on_done=progress))
@@ -209,16 +216,17 @@ def main() -> int:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--draws", type=int, default=10, help="of the noise, for every real pass and papers' pass (10)")
-    parser.add_argument("--listed", type=int, default=240, help="listed passes of each kind (240)")
+    parser.add_argument("--listed", type=int, default=240, help="listed passes of each kind (240); 0: none")
+    parser.add_argument("--vacuum", action="store_true", help="without air")
     parser.add_argument("--json", type=output_file, metavar="FILE", help="write the figures here")
     parser.add_argument("--plot", type=output_picture, metavar="FILE", help="draw the real passes (PNG)")
     chosen = parser.parse_args()
     if not pass_names():
         say("no real passes: ../shared/data/passes is not there")
         return 1
-    if chosen.draws < 1 or chosen.listed < CHUNK:
-        parser.error(f"--draws must be 1 or more, --listed {CHUNK} or more")
-    found = all_trials(chosen.draws, chosen.listed)
+    if chosen.draws < 1 or 0 != chosen.listed < CHUNK:
+        parser.error(f"--draws must be 1 or more, --listed 0, or {CHUNK} or more")
+    found = all_trials(chosen.draws, chosen.listed, not chosen.vacuum)
     lots = [lot_of(label, trials) for label, trials in found.items()]
     print(f"{passes_text(found)}\n\n{lots_text(lots)}")
     if chosen.json:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import acu_daemon.cli as cli
 from acu_daemon.cli.options import coming_pass, load_target
+from acu_daemon.cli.simulated import station_air
 from acu_daemon.cli.virtual_pass import Flight, fly
 from acu_daemon.daemon.live import live_text
 from acu_daemon.daemon.snapshot import Snapshot
@@ -57,7 +58,8 @@ def night() -> Flight:
         losses=(Loss("receiver", from_utc=coming.rise_tai_s + 100.0, to_utc=coming.rise_tai_s + 140.0),),
         faults=tuple(map(parse_fault, faults)),
     )
-    sky = make_sky(target.elements.propagator, target.station.site, scenario)
+    air = station_air(target.station)
+    sky = make_sky(target.elements.propagator, target.station.site, scenario, station_air=air)
     return fly(target, sky, scenario, begin_tai_s=begin_tai_s, end_tai_s=coming.set_tai_s + 10.0)
 
 

@@ -45,6 +45,11 @@ kind = "tle"
 file = "{tle}"
 """
 
+VACUUM = """\
+[atmosphere]
+refraction = false
+"""
+
 
 def pass_names() -> list[str]:
     """Names of the real passes; none where the folder is absent."""
@@ -62,11 +67,20 @@ def truth_span(name: str) -> tuple[str, str]:
     return lines[1].split(",")[0], lines[-1].split(",")[0]
 
 
-def write_config(directory: Path, name: str, url: str = "tcp://127.0.0.1:3842", beamwidth_deg: float = 1.0) -> str:
-    """Write station.toml and satellites/NAME.toml for a pass; returns NAME."""
+def write_config(
+    directory: Path,
+    name: str,
+    url: str = "tcp://127.0.0.1:3842",
+    beamwidth_deg: float = 1.0,
+    *,
+    is_vacuum: bool = False,
+) -> str:
+    """Write station.toml and satellites/NAME.toml for a pass, in standard air or a vacuum; returns NAME."""
     about = json.loads((PASSES / f"{name}.json").read_text())
     (directory / "satellites").mkdir(parents=True, exist_ok=True)
-    (directory / "station.toml").write_text(STATION.format(**about, url=url, beamwidth_deg=beamwidth_deg))
+    (directory / "station.toml").write_text(
+        STATION.format(**about, url=url, beamwidth_deg=beamwidth_deg) + (VACUUM if is_vacuum else "")
+    )
     tle = (PASSES / f"{name}.tle").as_posix()
     (directory / "satellites" / f"{about['satellite']}.toml").write_text(SATELLITE.format(**about, tle=tle))
     return str(about["satellite"])

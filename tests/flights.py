@@ -10,6 +10,7 @@ import numpy as np
 import acu_daemon.cli as cli
 from acu_daemon.acu.commands import SelectBackup, SelectMode
 from acu_daemon.cli.options import Target, coming_pass, load_target
+from acu_daemon.cli.simulated import station_air
 from acu_daemon.cli.virtual_pass import Flight, ScriptAccess, fly
 from acu_daemon.drivers.sa3842.messages import Command, WriteAndPoll, WriteParameter, WriteRegisters
 from acu_daemon.model import Pass, sky_angle_deg
@@ -29,6 +30,7 @@ RISING_ANTENNA = AcuChoice(azimuth_deg=168.0, elevation_deg=20.0)
 SCD_HIGH_TAI_S = tai_from_utc("1989-02-01T01:58:45Z") + 350.0  # SCD-1 climbs over Cuiaba
 WRONG_ORBIT = SkyErrors(along_track_s=0.9, delta_raan_deg=0.015)
 NOISE_DEG = 0.02
+DRAWN_BY = 1  # the seed of the air, as `fly` has it
 EFFECT_S = 0.020  # start of a write to the moment it takes effect, on TCP: docs/protocol.md, Time tags
 LSB_DEG = 360.0 / 65536
 ORDERS = (WriteAndPoll, WriteRegisters, SelectMode, SelectBackup, WriteParameter)
@@ -106,9 +108,11 @@ def climb(duration_s: float, target: Target | None = None, **changes: Any) -> Fl
     return flight_of(target or demo_target(), RISING_TAI_S, duration_s, **{"antenna": RISING_ANTENNA, **changes})
 
 
-def sky_of(target: Target, errors: SkyErrors = WRONG_ORBIT) -> SimulatedSky:
-    """Where the satellite really is."""
-    return make_sky(target.elements.propagator, target.station.site, Scenario(sky=errors))
+def sky_of(target: Target, errors: SkyErrors = WRONG_ORBIT, truth: Path | None = None) -> SimulatedSky:
+    """Where the satellite appears, in air that is not quite what the daemon is told."""
+    source, station = target.elements.propagator, target.station
+    air = station_air(station)
+    return make_sky(source, station.site, Scenario(sky=errors), truth, station_air=air, seed=DRAWN_BY)
 
 
 def the_pass(target: Target, now_tai_s: float) -> Pass:

@@ -16,14 +16,13 @@ from acu_daemon.model import sky_angle_deg
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 from acu_daemon.pointing.air import Air
 from acu_daemon.sim.apparent_sky import ApparentSky, make_air
-from acu_daemon.sim.build import StationAir, make_sky
+from acu_daemon.sim.build import make_sky
 from acu_daemon.sim.mount_axes import MountAxes
 from acu_daemon.sim.scenario import AcuChoice, AirChoice, Drift, Encoder, Scenario, SkyErrors
 from acu_daemon.sim.shell_air import simulated_air
 from acu_daemon.sim.sky import read_truth
 
 WEATHER = Air(1000.0, 20.0, 70.0)
-IN_AIR, ON_REQUEST = StationAir(WEATHER, True), StationAir(WEATHER, False)
 MOUNT = MountAxes(0.05, -0.04, 0.02, 0.015, -0.02, 0.01, 0.03)
 SERVO_DEG = 0.01  # what the autotrack loop of a moving star leaves
 
@@ -35,14 +34,14 @@ def truth(tmp_path: Path, lines: list[tuple[float, float, float]]) -> Path:
     return path
 
 
-def made(scenario: Scenario, station_air: StationAir | None, path: Path | None = None):  # type: ignore[no-untyped-def]
+def made(scenario: Scenario, station_air: Air | None, path: Path | None = None):  # type: ignore[no-untyped-def]
     target = demo_target()
     return make_sky(target.elements.propagator, target.station.site, scenario, path, station_air=station_air)
 
 
 def test_a_truth_file_stays_geometric_and_its_satellite_rises_earlier_in_air(tmp_path: Path) -> None:
     path = truth(tmp_path, [(t, 40.0, -2.0 + 0.05 * t) for t in np.arange(0.0, 200.0, 5.0)])
-    in_vacuum, in_air = made(Scenario(), None, path), made(Scenario(), IN_AIR, path)
+    in_vacuum, in_air = made(Scenario(), None, path), made(Scenario(air=AirChoice()), WEATHER, path)
     air = simulated_air(1000.0, 20.0, 70.0, demo_target().station.site.station.height_m)
     assert in_vacuum.direction(START_TAI_S + 39.0) is None
     assert in_air.direction(START_TAI_S + 20.0) is None  # at -1 deg
@@ -56,32 +55,36 @@ def test_a_truth_file_stays_geometric_and_its_satellite_rises_earlier_in_air(tmp
     assert later[0] == pytest.approx(40.0)
 
 
-@pytest.mark.parametrize(
-    ("air", "station_air", "has_air"),
-    [
-        (None, None, False),
-        (AirChoice(), None, False),  # [atmosphere] refraction = false: whatever the scenario says
-        (None, ON_REQUEST, False),
-        (AirChoice(), ON_REQUEST, True),
-        (None, IN_AIR, True),
-    ],
-)
-def test_there_is_air_where_station_or_scenario_say_so(
-    air: AirChoice | None, station_air: StationAir | None, has_air: bool, tmp_path: Path
-) -> None:
+def test_without_refraction_there_is_no_air_whatever_the_scenario_says(tmp_path: Path) -> None:
     path = truth(tmp_path, [(t, 40.0, 5.0) for t in np.arange(0.0, 50.0, 5.0)])
-    seen = made(Scenario(air=air), station_air, path).direction(START_TAI_S + 20.0)
-    assert seen is not None
-    assert (seen[1] > 5.1) == has_air
+    for scenario in (Scenario(), Scenario(air=AirChoice())):
+        seen = made(scenario, None, path).direction(START_TAI_S + 20.0)
+        assert seen == pytest.approx((40.0, 5.0, 1.2e6), abs=1e-6)
+
+
+def test_a_scenario_that_says_nothing_of_the_air_has_it_within_10_percent_of_what_is_told(tmp_path: Path) -> None:
+    path = truth(tmp_path, [(t, 40.0, 5.0) for t in np.arange(0.0, 50.0, 5.0)])
+
+    def raised_deg(scenario: Scenario, seed: int = 0) -> float:
+        target = demo_target()
+        source, site = target.elements.propagator, target.station.site
+        sky = make_sky(source, site, scenario, path, station_air=WEATHER, seed=seed)
+        seen = sky.direction(START_TAI_S + 20.0)
+        assert seen is not None
+        return seen[1] - 5.0
+
+    as_told = raised_deg(Scenario(air=AirChoice()))
+    drawn = [raised_deg(Scenario(), seed) / as_told for seed in range(20)]
+    assert 0.88 < min(drawn) < 0.95
+    assert 1.05 < max(drawn) < 1.12
 
 
 def test_the_stations_file_tells_the_weather_or_that_there_is_none() -> None:
-    target = demo_target(atmosphere={"refraction": True, "pressure_hpa": 980.0})
+    target = demo_target(atmosphere={"pressure_hpa": 980.0})
     found = station_air(target.station)
     assert found is not None
-    assert found.is_there
-    assert found.weather.pressure_hpa == 980.0
-    assert 15.0 < found.weather.temperature_c < 30.0  # the tropics' standard
+    assert found.pressure_hpa == 980.0
+    assert 15.0 < found.temperature_c < 30.0  # the tropics' standard
     assert station_air(demo_target(atmosphere={"refraction": False}).station) is None
     assert AtmosphereSection().air(target.station.site.station).pressure_hpa == pytest.approx(982.0, abs=5.0)
 
@@ -95,10 +98,8 @@ def test_a_scenario_has_its_own_weather_and_one_drawn_by_the_seed() -> None:
     assert lifted_deg(AirChoice(humidity_percent=0.0)) < 0.9 * told
     assert lifted_deg(AirChoice(profile="exponential")) == pytest.approx(told, rel=0.02)
     assert lifted_deg(AirChoice(profile="exponential")) != told
-    drawn = [lifted_deg(AirChoice(refractivity_drawn_within=0.1), seed) / told for seed in range(20)]
-    assert drawn[0] == lifted_deg(AirChoice(refractivity_drawn_within=0.1), 0) / told
-    assert 0.88 < min(drawn) < 0.95
-    assert 1.05 < max(drawn) < 1.12
+    drawn = [lifted_deg(AirChoice(refractivity_drawn_within=0.1), seed) for seed in (0, 0, 1)]
+    assert drawn[0] == drawn[1] != drawn[2]
 
 
 @needs_data
@@ -151,7 +152,8 @@ def test_the_encoders_drift_from_day_to_night() -> None:
 
 
 def test_without_air_mount_and_light_time_the_sky_is_the_geometric_one() -> None:
-    target = demo_target()
+    target = demo_target(atmosphere={"refraction": False})
     usual = made(Scenario(sky=SkyErrors(0.9, 0.015)), station_air(target.station))
     assert not isinstance(usual, ApparentSky)
     assert type(usual) is type(sky_of(target))
+    assert isinstance(sky_of(demo_target()), ApparentSky)

@@ -114,6 +114,7 @@ def test_when_all_is_well_every_line_is_go_and_the_status_0(tmp_path: Path) -> N
         ("place", "GO"),
         ("clock", "GO"),
         ("leap seconds", "GO"),
+        ("air", "GO"),
         ("scd: elements", "GO"),
         ("scd: next pass", "GO"),
         ("scd: cable wrap", "GO"),

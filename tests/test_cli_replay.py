@@ -37,7 +37,8 @@ def station_of(real: RealPass) -> str:
         ("height_m = 277.0", f"height_m = {float(station.height_m)}"),
     ):
         text = replaced(text, old, new)
-    return f"{text}[time]\nut1_utc_s = {real.site.orientation.ut1_utc_s}\n"
+    time = f"[time]\nut1_utc_s = {real.site.orientation.ut1_utc_s}\n"
+    return f"{text}{time}[atmosphere]\nrefraction = false\n"  # the truth is geometric
 
 
 @pytest.fixture

@@ -33,7 +33,7 @@ STATION = Station("Cuiaba", -15.53, -56.07, 277.0)
 ANTENNA = AntennaModel(Mount(0.5, -0.3, 0.02, 0.015, -0.02, 0.01, 0.03), traced(350.0, STATION))
 IN_AIR, IN_VACUUM = Site(STATION, antenna=ANTENNA), Site(STATION)
 SOURCE = circular()
-NAMED_AIR = STATION_FILE + "\n[atmosphere]\nrefraction = true\n"
+ATMOSPHERE = STATION_FILE + "\n[atmosphere]\n"
 LOOKED_DEG = 1e-9
 RATES_DEG_S = 3e-5
 
@@ -113,7 +113,7 @@ def test_rise_and_set_are_apparent_and_the_plan_is_of_the_encoders() -> None:
 
 
 def test_a_flight_in_air_that_was_told_holds_the_satellite_through_a_loss() -> None:
-    target = demo_target(atmosphere={"refraction": True}, readings={"bias_sigma_elevation_deg": 0.02})
+    target = demo_target(readings={"bias_sigma_elevation_deg": 0.02})
     scenario = Scenario(sky=SkyErrors(0.9, 0.015), air=AirChoice(refractivity_factor=1.08))
     sky = make_sky(target.elements.propagator, target.station.site, scenario, station_air=station_air(target.station))
     flight = climb(70.0, target, sky=sky, losses=[(40.0, 70.0)])
@@ -147,14 +147,16 @@ def test_a_fit_in_a_vacuum_is_not_carried_into_air_nor_biases_to_another_mount()
 
 
 def test_check_tells_the_air_that_is_reckoned_with(tmp_path: Path) -> None:
-    told = NAMED_AIR + "pressure_hpa = 990.0\n"
+    told = ATMOSPHERE + "pressure_hpa = 990.0\n"
     lines = acu_daemon("check", "--config", write(tmp_path, told, scd=BROUWER)).out.splitlines()
     (line,) = [line for line in lines if line[7:].startswith("air ")]
     assert line.startswith("GO")
     assert "990 hPa" in line
     assert "part of it the standard air's: N 3" in line
     assert "appears 0.2" in line
-    without = acu_daemon("check", "--config", write(tmp_path, STATION_FILE, scd=BROUWER)).out.splitlines()
+    without = acu_daemon(
+        "check", "--config", write(tmp_path, ATMOSPHERE + "refraction = false\n", scd=BROUWER)
+    ).out.splitlines()
     assert not [line for line in without if line[7:].startswith("air ")]
 
 

@@ -12,6 +12,7 @@ from test_daemon_events import NeverFitting
 from test_tick import AZ_DEG, CONFIG, EL_DEG, NOW, PLAN, SKY, ready, saw, status
 
 from acu_daemon.acu.commands import AcuMode, PointAndPoll
+from acu_daemon.assist.mount_model import encoder_look
 from acu_daemon.assist.session.prediction import predict
 from acu_daemon.control.state import ControlState, PathOffset
 from acu_daemon.control.tick import tick
@@ -19,7 +20,6 @@ from acu_daemon.control.tick_input import Sky, TickInput
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.control.tracking.track_frame import beside, extents, offset_of
 from acu_daemon.model import Model, Prediction, sky_angle_deg
-from acu_daemon.orbit.look import look_at
 from acu_daemon.sim.scenario import SkyErrors
 from acu_daemon.sim.sky import DelayedPropagator
 
@@ -41,7 +41,8 @@ PATH = real_path()
 @pytest.mark.parametrize("at_s", [0.0, 60.0, 110.0])
 def test_beside_the_path_is_where_a_satellite_is_seen_that_comes_late(late_s: float, at_s: float) -> None:
     target = demo_target()
-    seen = look_at(DelayedPropagator(target.elements.propagator, late_s), np.array([T + at_s]), target.station.site)
+    late = DelayedPropagator(target.elements.propagator, late_s)
+    seen = encoder_look(late, np.array([T + at_s]), target.station.site, None)
     point = beside(PATH, T + at_s, (late_s, 0.0))
     assert point is not None
     assert sky_angle_deg(point.az_deg, point.el_deg, float(seen.az_deg[0]), float(seen.el_deg[0])) < TRACK_DEG

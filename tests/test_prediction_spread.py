@@ -5,12 +5,12 @@ import pytest
 from flights import RISING_TAI_S, demo_target
 
 from acu_daemon.assist.estimators.full.estimated_states import ORBIT, correction_of, make_prior
+from acu_daemon.assist.mount_model import encoder_look
 from acu_daemon.assist.session.prediction import predict
 from acu_daemon.assist.session.prediction_spread import spread_of
 from acu_daemon.assist.settings import EstimatorSettings, StateSigmas
 from acu_daemon.control.tracking.track_frame import offset_of
 from acu_daemon.model import Correction, FitResult
-from acu_daemon.orbit.look import look_at
 
 T = RISING_TAI_S
 DRAW_COUNT = 300
@@ -29,7 +29,7 @@ def test_the_spread_of_the_elements_is_that_of_orbits_drawn_from_what_they_are_w
     covariance = make_prior(source, settings, T).covariance[ORBIT, ORBIT]
     offsets = []
     for x in rng.multivariate_normal(np.zeros(len(covariance)), covariance, DRAW_COUNT):
-        seen = look_at(source.corrected(correction_of(x)), np.array([T + at_s]), site)
+        seen = encoder_look(source.corrected(correction_of(x)), np.array([T + at_s]), site, None)
         offset = offset_of(buffer, T + at_s, float(seen.az_deg[0]), float(seen.el_deg[0]))
         assert offset is not None
         offsets.append(offset)

@@ -14,6 +14,7 @@ from structlog.testing import capture_logs
 
 from acu_daemon.assist.estimators.estimator import ESTIMATORS
 from acu_daemon.assist.estimators.full.carry_over import CarryOver
+from acu_daemon.assist.mount_model import encoder_look
 from acu_daemon.cli.kept import Kept, open_kept
 from acu_daemon.cli.options import coming_pass, load_target
 from acu_daemon.config.to_settings import estimator_settings
@@ -22,7 +23,6 @@ from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.writer import Writer
 from acu_daemon.model import FitResult, Readings
-from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.timescales import tai_from_utc
 
 NEAR_TAI_S = tai_from_utc("1989-01-31T15:00:00Z")
@@ -65,7 +65,7 @@ class Place:
         """To the first minute of the pass, without noise."""
         target = self.target
         tai_s = self.coming.rise_tai_s + np.arange(30.0, 90.0)
-        seen = look_at(target.elements.propagator, tai_s, target.station.site)
+        seen = encoder_look(target.elements.propagator, tai_s, target.station.site, None)
         settings = estimator_settings(target.station, target.satellite)
         name = target.station.tracking.estimator
         estimator = ESTIMATORS[name](target.elements.propagator, target.station.site, settings)

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from conftest import needs_data
-from flights import changed, loss, register_errors_deg, worst_error_deg
+from flights import changed, loss, register_errors_deg, sky_of, worst_error_deg
 from script_modules import load
 
 from acu_daemon.cli.options import load_target
@@ -15,7 +15,6 @@ from acu_daemon.cli.virtual_pass import Flight, fly
 from acu_daemon.control.tracking.lag import PRIOR_LAG_S
 from acu_daemon.edge.fit import InlineFitRunner
 from acu_daemon.sim.scenario import Scenario, read_scenario
-from acu_daemon.sim.sky import read_truth
 
 pass_rig = load("pass_rig")
 pytestmark = needs_data
@@ -58,7 +57,8 @@ def test_the_first_fit_takes_the_registers_no_further_off_however_late_it_comes(
 ) -> None:
     end_tai_s = scene.start_tai_s + TRACKED_S
     flight = flight_until(end_tai_s, scene, scenario, estimator, make_runner=late_by(latency_s))
-    errors_deg = register_errors_deg(flight, read_truth(scene.truth), first_fit_tai_s(flight), end_tai_s - 1.0)
+    sky = sky_of(load_target(scene.config, scene.satellite, scene.start_tai_s), truth=scene.truth)
+    errors_deg = register_errors_deg(flight, sky, first_fit_tai_s(flight), end_tai_s - 1.0)
     assert len(errors_deg) > 10
     assert max(errors_deg) <= MAX_ERROR_DEG
 

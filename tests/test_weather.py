@@ -140,7 +140,7 @@ def test_an_address_that_cannot_be_had_is_told_and_the_file_still_read(tmp_path:
 
 
 def test_the_pass_is_planned_anew_where_the_air_has_changed_and_not_for_less(tmp_path: Path) -> None:
-    target = demo_target(atmosphere={"refraction": True, "weather_file": "weather.json"})
+    target = demo_target(atmosphere={"weather_file": "weather.json"})
     file = tmp_path / "weather.json"
     file.write_bytes(text_of())
 

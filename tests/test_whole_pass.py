@@ -32,7 +32,6 @@ from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.pointing.keyhole import KeyholeRules, SkyPath, follow_path
 from acu_daemon.sim.scenario import AcuChoice, Encoder, Scenario, SkyErrors
-from acu_daemon.sim.sky import read_truth
 
 LEAD_S = 30.0
 LOSS_SHARES = (0.25, 0.37)
@@ -265,7 +264,7 @@ def test_on_a_real_pass_a_loss_at_culmination_is_held_and_relocked(name: str, tm
     satellite = write_config(directory, name)
     first, last = (tai_from_utc(utc) for utc in truth_span(name))
     target = load_target(directory, satellite, first)
-    sky = read_truth(truth_path(name))
+    sky = sky_of(target, truth=truth_path(name))
     middle = (first + last) / 2
     begin, lost, back = middle - 75.0, middle - 25.0, middle + 35.0
     seen = sky.direction(begin)

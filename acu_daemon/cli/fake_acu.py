@@ -67,8 +67,9 @@ def command(
     Faults: [[fault]] tables of the scenario (verb, start_s, duration_s, count, probability, value, axis, on, seed), or
     live, one line in, one line out:  echo 'fault no-reply count=3' | nc 127.0.0.1 3900;  `help` lists all verbs.
 
-    There is air over the antenna where the scenario has [air] or the station [atmosphere] refraction = true, never with
-    refraction = false; a truth CSV stays geometric.  The trace has beam and satellite where they are in that air.
+    There is air over the antenna: without [air] in the scenario what the station's [atmosphere] tells the daemon, its
+    refractivity within +-10 % of that, by --seed; with refraction = false none.  A truth CSV stays geometric; the trace
+    has beam and satellite where they are in that air.
 
     Prints `listening tcp://HOST:PORT` (or the link of the pseudo terminal) when it is ready; ends on SIGTERM or Ctrl-C.
     Run the daemon beside it with the same --at: whichever starts first, on one machine both share its clock, and either

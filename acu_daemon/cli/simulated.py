@@ -1,12 +1,10 @@
 """What the simulator needs of a station's file."""
 
 from acu_daemon.config.station_tables import StationFile
-from acu_daemon.sim.build import StationAir
+from acu_daemon.pointing.air import Air
 
 
-def station_air(station: StationFile) -> StationAir | None:
-    """The air over the antenna; None: `refraction = false`, a vacuum."""
+def station_air(station: StationFile) -> Air | None:
+    """The weather that the daemon is told of; None: `refraction = false`, a vacuum."""
     section = station.atmosphere
-    if section.refraction is False:
-        return None
-    return StationAir(section.air(station.site.station), section.has_refraction)
+    return section.air(station.site.station) if section.refraction else None

@@ -57,7 +57,7 @@ class ReadingsSection(Section):
         default=0.0,
         ge=0,
         description=(
-            "A part that grows with cot(el): an antenna that sags; where there is air, a tenth of its refraction is "
+            "A part that grows with cot(el): an antenna that sags; where there is air, 0.08 of its refraction is "
             "added.  Decides the same; costs accuracy where the antenna does not sag (docs/accuracy.md)."
         ),
     )

@@ -57,7 +57,7 @@ class WeatherReader:
 
     def __init__(self, given: AtmosphereSection, station: Station, config: Path) -> None:
         self._given, self._station = given, station
-        is_used = given.has_refraction
+        is_used = given.refraction
         file = None if given.weather_file is None or not is_used else config / given.weather_file
         self._source = NewestText(given.weather_udp if is_used else None, file)
         self._newest: Weather | None = None

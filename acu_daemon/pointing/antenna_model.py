@@ -99,14 +99,15 @@ class AntennaModel:
         self, az_deg: Array, el_deg: Array, range_m: Array, az_rate_deg_s: Array, el_rate_deg_s: Array
     ) -> tuple[Array, Array, Array, Array]:
         """Turn geometric directions and their rates into angles and rates of the encoders; the range's is left out."""
-        encoder_az_deg, encoder_el_deg, partials = self.with_partials(az_deg, el_deg, range_m)
-        by = partials.by_direction
-        return (
-            encoder_az_deg,
-            encoder_el_deg,
-            by[..., 0, 0] * az_rate_deg_s + by[..., 0, 1] * el_rate_deg_s,
-            by[..., 1, 0] * az_rate_deg_s + by[..., 1, 1] * el_rate_deg_s,
-        )
+        if self.refraction is not None:
+            el_deg, slope, _ = self.refraction.apparent_with_slope(el_deg, range_m, self.refraction_scale)
+            el_rate_deg_s = slope * el_rate_deg_s
+        encoder_az_deg, encoder_el_deg = self.mount.encoders_deg(az_deg, el_deg)
+        if self.mount.is_square:
+            return encoder_az_deg, encoder_el_deg, az_rate_deg_s, el_rate_deg_s
+        (aa, ae), (ea, ee) = self.mount.by_direction(az_deg, el_deg)
+        az_rate, el_rate = aa * az_rate_deg_s + ae * el_rate_deg_s, ea * az_rate_deg_s + ee * el_rate_deg_s
+        return encoder_az_deg, encoder_el_deg, az_rate, el_rate
 
     def with_partials(
         self, az_deg: npt.ArrayLike, el_deg: npt.ArrayLike, range_m: npt.ArrayLike = np.inf

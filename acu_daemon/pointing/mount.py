@@ -39,9 +39,16 @@ class Mount:
     aw_deg: float = 0.0  # azimuth axis leans west
     tf_deg: float = 0.0  # flexure: the beam sags by TF cos h
 
+    @property
+    def is_square(self) -> bool:
+        """Whether the zero points of the encoders are all that there is."""
+        return self.ca_deg == self.npae_deg == self.an_deg == self.aw_deg == self.tf_deg == 0.0
+
     def encoders_deg(self, az_deg: npt.ArrayLike, el_deg: npt.ArrayLike) -> tuple[Array, Array]:
         """Turn the beam's direction into what the encoders read, both continuous (not wrapped to 360), () or (N,)."""
         az, el = np.asarray(az_deg, dtype=np.float64), np.asarray(el_deg, dtype=np.float64)
+        if self.is_square:
+            return az + self.ia_deg, el + self.ie_deg
         azimuths, elevations = shares(az, el)
         terms = self.terms_deg()
         return az + azimuths @ terms, el + elevations @ terms
@@ -51,6 +58,8 @@ class Mount:
         encoder_az = np.asarray(encoder_az_deg, dtype=np.float64)
         encoder_el = np.asarray(encoder_el_deg, dtype=np.float64)
         az, el = encoder_az - self.ia_deg, encoder_el - self.ie_deg
+        if self.is_square:
+            return az, el
         for _ in range(_MOST_STEPS):
             there_az, there_el = self.encoders_deg(az, el)
             off_az, off_el = encoder_az - there_az, encoder_el - there_el

@@ -1,6 +1,6 @@
 """SIMULATION: puts a fake ACU together from what a command line and a configuration give."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import radians
 from pathlib import Path
 
@@ -14,13 +14,7 @@ from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.scenario import AirChoice, Scenario, read_scenario
 from acu_daemon.sim.sky import DelayedPropagator, OrbitSky, SimulatedSky, read_truth
 
-
-@dataclass(frozen=True, slots=True)
-class StationAir:
-    """What a station's file says of the air over the antenna: the scenario may make it another, or ask for it."""
-
-    weather: Air
-    is_there: bool  # whether there is air where the scenario has no [air]
+_UNSAID = AirChoice(refractivity_drawn_within=0.1)  # where a scenario has no [air]: weather is never quite as told
 
 
 def make_sky(
@@ -29,16 +23,17 @@ def make_sky(
     scenario: Scenario,
     truth: Path | None = None,
     *,
-    station_air: StationAir | None = None,
+    station_air: Air | None = None,
     seed: int = 0,
 ) -> SimulatedSky:
     """The sky as the antenna meets it: from a truth CSV, else from the elements with the scenario's errors.
 
-    station_air: None is a vacuum, whatever the scenario says.  UsageError: the CSV is wrong.
+    station_air: the weather that the daemon is told of; None is a vacuum, whatever the scenario says.
+    UsageError: the CSV is wrong.
     """
     errors, air = scenario.sky, None
-    if station_air is not None and (station_air.is_there or scenario.air is not None):
-        air = make_air(station_air.weather, scenario.air or AirChoice(), site.station.height_m, seed)
+    if station_air is not None:
+        air = make_air(station_air, scenario.air or _UNSAID, site.station.height_m, seed)
     lowest_el_deg = 0.0 if air is None else LOWEST_GEOMETRIC_EL_DEG
     geometric: SimulatedSky
     if truth is not None:
@@ -60,7 +55,7 @@ def build_fake_acu(
     start_tai_s: float,
     scenario: Path | None = None,
     truth: Path | None = None,
-    station_air: StationAir | None = None,
+    station_air: Air | None = None,
     seed: int = 0,
     address: int = DEFAULT_ADDRESS,
 ) -> FakeAcu:

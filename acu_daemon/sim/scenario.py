@@ -140,7 +140,7 @@ class Scenario:
     acu: AcuChoice = AcuChoice()
     losses: tuple[Loss, ...] = ()
     faults: tuple[Fault, ...] = ()
-    air: AirChoice | None = None  # None: where the station's file says so there is air all the same
+    air: AirChoice | None = None  # None: within 10 % of what the station's file tells the daemon
     mount: MountAxes = MountAxes()
     drift: Drift = Drift()
 

@@ -102,7 +102,7 @@ def _sky_of(truth: Sgp4Propagator, site: Site, expected: Pass) -> Sky:
     seen = look_at(truth, tai_s, site)
     up = seen.el_deg >= _LEAST_EL_DEG
     name = f"{truth.elements.name}, {float(seen.el_deg.max()):.0f} deg"
-    return Sky(name, site, tai_s[up], seen.az_deg[up], seen.el_deg[up])
+    return Sky(name, site, tai_s[up], seen.az_deg[up], seen.el_deg[up], seen.range_m[up])
 
 
 @cache

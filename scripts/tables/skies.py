@@ -23,6 +23,7 @@ class Sky:
     tai_s: Array
     az_deg: Array
     el_deg: Array
+    range_m: Array
 
 
 def real_sky(name: str) -> Sky:
@@ -32,8 +33,8 @@ def real_sky(name: str) -> Sky:
     table = read_truth(truth_path(name))
     tai_s = np.arange(table.start_tai_s, table.end_tai_s)
     seen = [table.direction(float(t)) or (np.nan, np.nan, np.nan) for t in tai_s]
-    az_deg, el_deg, _ = np.array(seen, dtype=np.float64).T
-    return Sky(name, Site(station, EarthOrientation(ut1_utc_s=about["ut1_utc_s"])), tai_s, az_deg, el_deg)
+    az_deg, el_deg, range_m = np.array(seen, dtype=np.float64).T
+    return Sky(name, Site(station, EarthOrientation(ut1_utc_s=about["ut1_utc_s"])), tai_s, az_deg, el_deg, range_m)
 
 
 def real_elements(name: str, wrong_deg: float = 0.0) -> Sgp4Propagator:

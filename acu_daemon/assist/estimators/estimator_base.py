@@ -7,6 +7,7 @@ import numpy as np
 
 from acu_daemon.assist.reading_gate import ReadingGate, Rejected
 from acu_daemon.assist.settings import EstimatorSettings
+from acu_daemon.assist.spaced_times import spaced
 from acu_daemon.model import Correction, FitResult, Readings, Site, sky_angle_deg
 from acu_daemon.orbit.frames import station_itrs_m, teme_from_itrs
 from acu_daemon.orbit.look import look_at
@@ -14,6 +15,7 @@ from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import DEG, MU_M3_S2, Array
 
 _NEWEST_COUNT = 30  # readings that the residual is taken over
+_RANGE_STEP_S = 10.0  # a range is interpolated to a kilometre: 3e-6 deg at 5 deg of elevation
 
 
 class BaseEstimator(ABC):
@@ -68,7 +70,8 @@ class BaseEstimator(ABC):
         antenna = self._site.antenna
         if antenna is None:
             return readings
-        range_m = look_at(self._source, readings.tai_s, self._site).range_m
+        few = spaced(readings.tai_s, _RANGE_STEP_S)
+        range_m = np.interp(readings.tai_s, few, look_at(self._source, few, self._site).range_m)
         az_deg, el_deg = antenna.geometric_deg(readings.az_deg, readings.el_deg, range_m)
         return replace(readings, az_deg=az_deg % 360.0, el_deg=el_deg)
 

@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from acu_daemon.assist.estimators.full.estimated_states import BIAS, EL_COT, MOUNT
-from acu_daemon.assist.estimators.full.path_partials import Curve, cot_el, enu_m, low_shape
+from acu_daemon.assist.estimators.full.path_partials import Curve, cot_el, enu_m, has_air, low_shape
 from acu_daemon.assist.settings import EstimatorSettings
+from acu_daemon.assist.spaced_times import spaced
 from acu_daemon.model import Readings, Site
 from acu_daemon.pointing.mount import axes_on_the_sky
 from acu_daemon.units import DEG, Array
@@ -18,6 +19,7 @@ from acu_daemon.units import DEG, Array
 Indices = npt.NDArray[np.int64]
 
 NORMAL_POINT_S = 1.0
+_SHAPE_STEP_S = 2.0
 _HUBER, _LAST_SIGMAS = 3.0, 10.0  # of both components together; from the first on weights fall, at the last to zero
 _FALL_FROM = 6.0
 _NOISE_WORTH_COUNT = 30.0  # the configured noise counts like so many readings against the noise seen
@@ -58,12 +60,9 @@ class Residuals:
 
 def residuals(path: Curve, here: Site, x: Array, settings: EstimatorSettings, seen: Sights) -> Residuals:
     """Compare readings with a path, the site and the biases of the states x."""
-    enu = enu_m(path.at(seen.tai_s), here)
-    range_m = np.sqrt((enu * enu).sum(axis=0))
-    east, north, up = enu / range_m
-    cos_el = np.sqrt(east * east + north * north)
+    (east, north, up), cos_el, _ = _directions(path, here, seen.tai_s)
     cot = cot_el(up, cos_el)
-    low, _ = low_shape(here, up, cos_el, range_m) if x[EL_COT] else (cot, cot)
+    low = _refraction_shape(path, here, seen.tai_s) if x[EL_COT] and has_air(here) else cot
     az, az_sec, el, el_cot = x[BIAS]
     off, sigma = np.empty((2, 2, seen.tai_s.size))
     off[0] = seen.sin_az * north - seen.cos_az * east - az * cos_el - az_sec
@@ -77,6 +76,22 @@ def residuals(path: Curve, here: Site, x: Array, settings: EstimatorSettings, se
     scale = _noise_scale(sigmas_off)
     noise = sigma * np.minimum(scale, _MOST_NOISE)[:, None]
     return Residuals(off, noise, scale, robust_weights(sigmas_off / scale[:, None]))
+
+
+def _directions(path: Curve, here: Site, tai_s: Array) -> tuple[Array, Array, Array]:
+    """East, north, up of the directions at the times (N,), (3, N), cosine of the elevation, distance (m)."""
+    enu = enu_m(path.at(tai_s), here)
+    range_m = np.sqrt((enu * enu).sum(axis=0))
+    enu /= range_m
+    return enu, np.sqrt(enu[0] * enu[0] + enu[1] * enu[1]), range_m
+
+
+def _refraction_shape(path: Curve, here: Site, tai_s: Array) -> Array:
+    """The shape of the refraction at the times (N,), interpolated, to 0.01 of it at 5 deg of elevation."""
+    few = spaced(tai_s, _SHAPE_STEP_S)
+    (_, _, up), cos_el, range_m = _directions(path, here, few)
+    low: Array = np.interp(tai_s, few, low_shape(here, up, cos_el, range_m)[0])
+    return low
 
 
 def _noise_scale(sigmas_off: Array) -> Array:

@@ -164,9 +164,14 @@ def covariance_on_sky(covariance: Array, partials: Array) -> tuple[Array, Array,
     )
 
 
+def has_air(site: Site) -> bool:
+    """Whether the biases' low part is shaped like refraction."""
+    return site.antenna is not None and site.antenna.has_air
+
+
 def low_shape(site: Site, sin_el: Array, cos_el: Array, range_m: Array) -> tuple[Array, Array]:
     """What a unit of the bias el_cot moves in elevation, and its derivative by that, 1 / deg: AngleBias."""
-    if site.antenna is not None and site.antenna.has_air:
+    if site.antenna is not None and has_air(site):
         return site.antenna.refraction_shape(np.arctan2(sin_el, cos_el) / DEG, range_m)
     cot = cot_el(sin_el, cos_el)
     return cot, -DEG * (1.0 + cot * cot)
