@@ -46,7 +46,7 @@ def writers() -> dict[str, set[str]]:
             name, given = call.func.id, [keyword.arg for keyword in call.keywords]
             if name == "ControlState" and (call.args or given):
                 found["all"].add(module)
-            elif name == "replace" and set(given) <= set(part_of.values()):  # of a memory, not of a part
+            elif name == "with_parts":
                 for part in given:
                     found[str(part)].add(module)
             elif name in part_of and name not in own:

@@ -14,6 +14,7 @@ from acu_daemon.control.startup import next_command
 from acu_daemon.control.state import ControlState, StartStage
 from acu_daemon.control.tick_input import Exchange
 from acu_daemon.control.tracking.mode_selection import wanted_mode_command
+from acu_daemon.control.with_parts import with_parts
 
 EXTRA_REPEAT_S = 0.3  # a command gets this long to show in the status before it is sent again
 EXTRA_SETTLED_S = 0.7  # after that; a status that still contradicts itself means it
@@ -58,16 +59,16 @@ def note_asked(state: ControlState, extra: Command | None, now_tai_s: float) -> 
     """Remember what is sent now."""
     if extra is None:
         return state
-    return replace(state, asked=replace(state.asked, command=extra, again_tai_s=now_tai_s + EXTRA_REPEAT_S))
+    return with_parts(state, asked=replace(state.asked, command=extra, again_tai_s=now_tai_s + EXTRA_REPEAT_S))
 
 
 def wait_after_refusal(state: ControlState, extra: Exchange, now_tai_s: float) -> ControlState:
     """Let a command wait that the ACU refused; STOP never does."""
     if not isinstance(extra.reply, Refused) or isinstance(extra.command, Stop):
         return state
-    return replace(state, asked=replace(state.asked, again_tai_s=now_tai_s + REFUSED_EXTRA_S))
+    return with_parts(state, asked=replace(state.asked, again_tai_s=now_tai_s + REFUSED_EXTRA_S))
 
 
 def forget_asked(state: ControlState) -> ControlState:
     """Another start asks from the beginning."""
-    return replace(state, asked=replace(state.asked, command=None))
+    return with_parts(state, asked=replace(state.asked, command=None))

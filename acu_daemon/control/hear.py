@@ -15,6 +15,7 @@ from acu_daemon.control.state import ControlState, Fitting
 from acu_daemon.control.tick_input import Arrival, Exchange, Observation
 from acu_daemon.control.tracking.causes import is_acquired
 from acu_daemon.control.tracking.state_table import AUTOTRACKING
+from acu_daemon.control.with_parts import with_parts
 from acu_daemon.model import Reading
 
 ROUNDING_S = 1e-6  # of differences of TAI
@@ -46,7 +47,7 @@ def _hear_status(
     tai_s = _sample_tai_s(arrival, config)
     plausibility = judge(state.plausibility, status, tai_s, config.azimuth, config.elevation, config.acu.silence_s)
     if not plausibility.is_believed:
-        return replace(state, plausibility=plausibility), Heard(seen, doubt=plausibility.reason)
+        return with_parts(state, plausibility=plausibility), Heard(seen, doubt=plausibility.reason)
     reading = Reading(tai_s, status.az_deg, status.el_deg, is_acquired(status), status.agc_db)
     seen = replace(
         seen,
@@ -59,7 +60,7 @@ def _hear_status(
     if is_locked and not arrival.is_sure:
         fitting = replace(fitting, out_of_step_count=fitting.out_of_step_count + 1)
     is_to_fit = is_locked and arrival.is_sure and state.tracking.track in AUTOTRACKING and not state.encoders.problem
-    return replace(state, plausibility=plausibility, fitting=fitting), Heard(seen, reading, is_to_fit)
+    return with_parts(state, plausibility=plausibility, fitting=fitting), Heard(seen, reading, is_to_fit)
 
 
 def _sample_tai_s(arrival: Arrival, config: ControlConfig) -> float:

@@ -10,6 +10,7 @@ from acu_daemon.control.state import ControlState, Intake
 from acu_daemon.control.tick_input import Sky, TickInput
 from acu_daemon.control.tracking.causes import is_acquired
 from acu_daemon.control.tracking.state_table import AUTOTRACKING
+from acu_daemon.control.with_parts import with_parts
 from acu_daemon.model import Reading
 
 RATE_READINGS = 6  # the rate of an axis is taken over this many readings: near the zenith one pair is all noise
@@ -29,7 +30,7 @@ def take_status(
         is_stow_kept=_is_stow_kept(state, status),
     )
     encoders = _watched(state, status, reading, given.sky, events) if given.seen.is_in_step else state.encoders
-    return replace(state, intake=intake, encoders=encoders)
+    return with_parts(state, intake=intake, encoders=encoders)
 
 
 def _is_stow_kept(state: ControlState, status: AcuStatus) -> bool:
@@ -45,12 +46,12 @@ def shift_places(state: ControlState, shift_deg: float) -> ControlState:
     """Put the azimuth on another turn: by a multiple of 360 deg further on."""
     intake = state.intake
     readings = tuple((tai_s, az + shift_deg, el) for tai_s, az, el in intake.track_of_readings)
-    return replace(state, intake=replace(intake, az_deg=intake.az_deg + shift_deg, track_of_readings=readings))
+    return with_parts(state, intake=replace(intake, az_deg=intake.az_deg + shift_deg, track_of_readings=readings))
 
 
 def doubt_place(state: ControlState) -> ControlState:
     """After a lost link nobody knows where the antenna is, until some readings agree."""
-    return replace(state, intake=replace(state.intake, is_place_sure=False))
+    return with_parts(state, intake=replace(state.intake, is_place_sure=False))
 
 
 def _watched(state: ControlState, status: AcuStatus, reading: Reading, sky: Sky, events: list[Event]) -> EncoderWatch:

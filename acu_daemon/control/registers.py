@@ -13,6 +13,7 @@ from acu_daemon.control.state import ControlState, Sent
 from acu_daemon.control.tick_input import Observation
 from acu_daemon.control.tracking.register_limiter import Passed, limit, within_limits
 from acu_daemon.control.tracking.state_table import TrackState
+from acu_daemon.control.with_parts import with_parts
 from acu_daemon.model import Pointing
 
 REFUSED_PAUSE_S = 1.0  # a write that is refused again within REFUSED_AGAIN_S waits this long
@@ -32,7 +33,7 @@ def take_refusal(state: ControlState, now_tai_s: float, events: list[Event]) -> 
     events.append(Event("acu.refused_write", fields, is_warning=True))
     pause_s = REFUSED_PAUSE_S if is_again else 0.0
     registers = replace(registers, refused_tai_s=now_tai_s, refused_until_tai_s=now_tai_s + pause_s)
-    return replace(state, registers=registers)
+    return with_parts(state, registers=registers)
 
 
 def take_in_force(state: ControlState, seen: Observation) -> ControlState:
@@ -41,7 +42,7 @@ def take_in_force(state: ControlState, seen: Observation) -> ControlState:
     if sent is None or seen.refused is not None or seen.reading is None:
         return state
     in_force = (seen.reading.tai_s, sent.az_deg, sent.el_deg)
-    return replace(state, registers=replace(state.registers, in_force=in_force))
+    return with_parts(state, registers=replace(state.registers, in_force=in_force))
 
 
 def shift_registers(state: ControlState, shift_deg: float) -> ControlState:
@@ -53,30 +54,30 @@ def shift_registers(state: ControlState, shift_deg: float) -> ControlState:
         commands=(),
         in_force=None if in_force is None else (in_force[0], in_force[1] + shift_deg, in_force[2]),
     )
-    return replace(state, registers=registers)
+    return with_parts(state, registers=registers)
 
 
 def forget_axes(state: ControlState) -> ControlState:
     """The next write starts from where the antenna is."""
     registers = replace(state.registers, axis_az=None, axis_el=None, was_followed=False)
-    return replace(state, registers=registers)
+    return with_parts(state, registers=registers)
 
 
 def forget_writes(state: ControlState) -> ControlState:
     """With the link what was written last is lost."""
     registers = replace(state.registers, axis_az=None, axis_el=None, last_write_tai_s=None, commands=())
-    return replace(state, registers=registers)
+    return with_parts(state, registers=registers)
 
 
 def forget_in_force(state: ControlState) -> ControlState:
     """Once the antenna was stopped no register is followed."""
-    return replace(state, registers=replace(state.registers, in_force=None))
+    return with_parts(state, registers=replace(state.registers, in_force=None))
 
 
 def note_no_write(state: ControlState) -> ControlState:
     """A tick without a write."""
     commands = (*state.registers.commands[-2:], None)
-    return replace(state, registers=replace(state.registers, commands=commands))
+    return with_parts(state, registers=replace(state.registers, commands=commands))
 
 
 def refuse_input(state: ControlState, refused: str, events: list[Event]) -> ControlState:
@@ -87,13 +88,13 @@ def refuse_input(state: ControlState, refused: str, events: list[Event]) -> Cont
     if not refused and not refusals.refused_input:
         return state
     count = refusals.refusal_count + bool(refused)
-    return replace(state, refusals=replace(refusals, refused_input=refused, refusal_count=count))
+    return with_parts(state, refusals=replace(refusals, refused_input=refused, refusal_count=count))
 
 
 def count_refusals(state: ControlState, count: int) -> ControlState:
     """Count commands that were kept back."""
     refusals = replace(state.refusals, refusal_count=state.refusals.refusal_count + count)
-    return replace(state, refusals=refusals)
+    return with_parts(state, refusals=refusals)
 
 
 def write(
@@ -148,7 +149,7 @@ def _tell(
         refusal_count=refusals.refusal_count + bool(passed.refusal),
         clamped_count=refusals.clamped_count + is_clamped,
     )
-    return replace(state, refusals=refusals)
+    return with_parts(state, refusals=refusals)
 
 
 def _sent(
@@ -180,10 +181,10 @@ def _sent(
         commands=(*registers.commands[-2:], Sent(az_deg, el_deg, is_free)),
         goal_az_deg=goal_az_deg,
     )
-    return replace(state, registers=registers), PointAndPoll(az_deg, el_deg)
+    return with_parts(state, registers=registers), PointAndPoll(az_deg, el_deg)
 
 
 def note_as_if_written(state: ControlState, written: ControlState) -> ControlState:
     """What a disarmed daemon would write, for people to see: all of it but the commands, of which none was sent."""
     registers = replace(written.registers, commands=state.registers.commands)
-    return replace(written, registers=registers)
+    return with_parts(written, registers=registers)

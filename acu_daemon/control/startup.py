@@ -29,6 +29,7 @@ from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.orders import Event
 from acu_daemon.control.state import ControlState, StartStage, Startup, Watchdog
 from acu_daemon.control.tick_input import Exchange
+from acu_daemon.control.with_parts import with_parts
 from acu_daemon.units import wrap_180
 
 WATCHDOG_TRY_S = 2.0  # without the answer that is hoped for, and the ACU counts as having no watchdog
@@ -63,13 +64,13 @@ def begin_again(state: ControlState, *, keeps_watchdog: bool) -> ControlState:
     is_kept = keeps_watchdog or startup.watchdog is Watchdog.REFUSED
     watchdog = startup.watchdog if is_kept else Watchdog.UNKNOWN
     stage = min(startup.stage, StartStage.REGISTERS_KNOWN)
-    return replace(state, startup=replace(startup, stage=stage, watchdog=watchdog))
+    return with_parts(state, startup=replace(startup, stage=stage, watchdog=watchdog))
 
 
 def begin_after_lost_link(state: ControlState) -> ControlState:
     """Begin with the first question; the watchdog, where it was set, is set again."""
     startup = replace(state.startup, stage=StartStage.NEW, watchdog=_unset(state.startup), watchdog_from_tai_s=None)
-    return replace(state, startup=startup)
+    return with_parts(state, startup=startup)
 
 
 def watch_for_power_cycle(state: ControlState, status: AcuStatus) -> ControlState:
@@ -82,7 +83,7 @@ def watch_for_power_cycle(state: ControlState, status: AcuStatus) -> ControlStat
     if state.startup.stage is not StartStage.READY or not was_remote or status.backup_selected is Backup.REMOTE:
         return state
     startup = replace(state.startup, stage=StartStage.IDENTIFIED, watchdog=_unset(state.startup))
-    return replace(state, startup=startup)
+    return with_parts(state, startup=startup)
 
 
 def _unset(startup: Startup) -> Watchdog:
@@ -136,7 +137,7 @@ def after_reply(
             startup = replace(
                 startup, stage=StartStage.READY if _matches(startup, read, config) else StartStage.SECTOR_FREE
             )
-    return state if startup is state.startup else replace(state, startup=startup)
+    return state if startup is state.startup else with_parts(state, startup=startup)
 
 
 def _identified(startup: Startup, identity: AcuIdentity, config: ControlConfig, events: list[Event]) -> Startup:

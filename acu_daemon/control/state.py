@@ -229,9 +229,9 @@ class Lag:
     el: LagEstimate = LagEstimate()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ControlState:
-    """The memory of the 10 Hz decision."""
+    """The memory of the 10 Hz decision.  Without slots: `with_parts` copies it at once."""
 
     plausibility: Plausibility = Plausibility()  # owner: control.hear
     fitting: Fitting = Fitting()

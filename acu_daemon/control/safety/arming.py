@@ -10,23 +10,24 @@ from acu_daemon.acu.replies import Done
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import Arming, ControlState, StartStage, Watchdog
 from acu_daemon.control.tick_input import Exchange
+from acu_daemon.control.with_parts import with_parts
 
 NO_STOP_MODES = (AcuMode.MANUAL, AcuMode.STOWING, AcuMode.STOWED, AcuMode.FAULT)  # a stop would disturb, or do nothing
 
 
 def set_armed(state: ControlState, *, is_stop_due: bool) -> ControlState:
     """A person arms."""
-    return replace(state, arming=Arming(by_people=True, is_stop_due=is_stop_due))
+    return with_parts(state, arming=Arming(by_people=True, is_stop_due=is_stop_due))
 
 
 def set_disarmed(state: ControlState, by: str) -> ControlState:
     """Somebody disarms.  A STOP that is owed stays so."""
-    return replace(state, arming=replace(state.arming, by_people=False, disarmed_by=by))
+    return with_parts(state, arming=replace(state.arming, by_people=False, disarmed_by=by))
 
 
 def owe_stop(state: ControlState, *, is_due: bool = True) -> ControlState:
     """Send STOP until it is acknowledged, or no more."""
-    return replace(state, arming=replace(state.arming, is_stop_due=is_due))
+    return with_parts(state, arming=replace(state.arming, is_stop_due=is_due))
 
 
 def take_stop(state: ControlState, extra: Exchange) -> ControlState:

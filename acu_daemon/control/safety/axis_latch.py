@@ -10,6 +10,7 @@ from acu_daemon.control.orders import Event
 from acu_daemon.control.safety.axis_watch import AxisSeen, duty_of, sky_scale, watch_axes
 from acu_daemon.control.state import ControlState, Latch, StartStage
 from acu_daemon.control.tick_input import Observation
+from acu_daemon.control.with_parts import with_parts
 from acu_daemon.units import wrap_180
 
 RATE_SPAN_S = 1.0
@@ -34,7 +35,7 @@ def watch_antenna(state: ControlState, seen: Observation, config: ControlConfig)
         (config.azimuth, config.elevation),
         config.following,
     )
-    return replace(state, latch=Latch(axes=axes)), problem
+    return with_parts(state, latch=Latch(axes=axes)), problem
 
 
 def _rates_deg_s(state: ControlState) -> tuple[float, float]:
@@ -51,14 +52,14 @@ def latch(state: ControlState, problem: str, events: list[Event]) -> ControlStat
     advice = "look, then `acu-daemon clear`"
     fields = {"problem": problem, "az_deg": state.intake.az_deg, "el_deg": el_deg, "advice": advice}
     events.append(Event("axis.latched", fields, is_warning=True))
-    return replace(state, latch=replace(state.latch, problem=problem))
+    return with_parts(state, latch=replace(state.latch, problem=problem))
 
 
 def clear_latch(state: ControlState) -> ControlState:
     """A person has looked at the antenna."""
-    return replace(state, latch=Latch())
+    return with_parts(state, latch=Latch())
 
 
 def forget_motion(state: ControlState) -> ControlState:
     """Judge the axes from the next reading on, as if none had been."""
-    return replace(state, latch=Latch(state.latch.problem))
+    return with_parts(state, latch=Latch(state.latch.problem))

@@ -9,6 +9,7 @@ from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState, ForeignStop, Held, StartStage
 from acu_daemon.control.tick_input import Observation
 from acu_daemon.control.tracking.state_table import ACTIVE, TrackState
+from acu_daemon.control.with_parts import with_parts
 
 STOPPED_FROM = (AcuMode.REMOTE, AcuMode.ACQUIRE, AcuMode.AUTOTRACK, AcuMode.REMOTE_BACKUP)
 ANOTHER_HAND = "another hand that stopped the antenna"
@@ -34,7 +35,7 @@ def watch_for_stop(before: ControlState, state: ControlState, config: ControlCon
     if not is_stopped or is_new_fault or not state.is_armed(config) or state.latch.problem:
         return settle(state), False
     if may_be_watchdog:
-        return replace(state, foreign_stop=ForeignStop(held, not now.has_interlock_fault)), False
+        return with_parts(state, foreign_stop=ForeignStop(held, not now.has_interlock_fault)), False
     return state, True
 
 
@@ -69,7 +70,7 @@ def note_held(state: ControlState, config: ControlConfig) -> ControlState:
 def _hold(state: ControlState, held: Held | None) -> ControlState:
     if held == state.foreign_stop.held:
         return state
-    return replace(state, foreign_stop=replace(state.foreign_stop, held=held))
+    return with_parts(state, foreign_stop=replace(state.foreign_stop, held=held))
 
 
 def release(state: ControlState) -> ControlState:
@@ -81,9 +82,9 @@ def settle(state: ControlState) -> ControlState:
     """Doubt no more who has stopped it."""
     if not state.foreign_stop.is_doubted:
         return state
-    return replace(state, foreign_stop=ForeignStop(state.foreign_stop.held))
+    return with_parts(state, foreign_stop=ForeignStop(state.foreign_stop.held))
 
 
 def forget_held(state: ControlState) -> ControlState:
     """Hold the antenna no more, whoever has stopped it."""
-    return replace(state, foreign_stop=ForeignStop())
+    return with_parts(state, foreign_stop=ForeignStop())

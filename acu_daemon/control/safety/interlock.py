@@ -1,13 +1,12 @@
 """The interlock: what a fault is, and the emergency stop or open door that disarms.  Owner of `Interlock`.  Pure."""
 
-from dataclasses import replace
-
 from acu_daemon.acu.commands import Command, ReadFaults
 from acu_daemon.acu.replies import AcuStatus, FaultReport
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState, Interlock, StartStage
 from acu_daemon.control.tick_input import Observation
 from acu_daemon.control.tracking.state_table import TrackState
+from acu_daemon.control.with_parts import with_parts
 
 
 def watch_interlock(state: ControlState, seen: Observation, config: ControlConfig) -> tuple[ControlState, str]:
@@ -15,7 +14,7 @@ def watch_interlock(state: ControlState, seen: Observation, config: ControlConfi
     faults = seen.extra.reply if seen.extra is not None else None
     if not isinstance(faults, FaultReport) or state.intake.status is None:
         return state if state.tracking.track is TrackState.FAULT else forget_faults(state), ""
-    state = replace(state, interlock=Interlock(_faults(state.intake.status)))
+    state = with_parts(state, interlock=Interlock(_faults(state.intake.status)))
     if not (faults.is_emergency_stop or faults.is_door_open) or not state.is_armed(config):
         return state, ""
     return state, "the emergency stop" if faults.is_emergency_stop else "an open door"
@@ -34,7 +33,7 @@ def question(state: ControlState) -> Command | None:
 
 def forget_faults(state: ControlState) -> ControlState:
     """The next fault is asked about anew."""
-    return state if state.interlock.faults_read is None else replace(state, interlock=Interlock())
+    return state if state.interlock.faults_read is None else with_parts(state, interlock=Interlock())
 
 
 def _faults(status: AcuStatus) -> tuple[bool, ...]:

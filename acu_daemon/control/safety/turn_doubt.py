@@ -43,6 +43,7 @@ from acu_daemon.control.state import ControlState, StartStage
 from acu_daemon.control.tick_input import Observation
 from acu_daemon.control.tracking.causes import is_acquired
 from acu_daemon.control.tracking.state_table import ACTIVE, TrackState
+from acu_daemon.control.with_parts import with_parts
 from acu_daemon.model import Reading
 
 LONGEST_STEP_DEG = 170.0  # between two readings; with more the turn is not known by counting
@@ -90,7 +91,7 @@ def doubt(state: ControlState, config: ControlConfig, events: list[Event], why: 
     events.append(Event("turn.doubted", fields, is_warning=True))
     problem = f"turn doubted: azimuth {az_deg:.1f} deg as believed, or {other_deg:.1f}" if other_deg else why
     turn = replace(at_rest(state.turn), phase=Phase.STOPPING, move_to_deg=None, is_sure=False, problem=problem)
-    state = replace(state, turn=turn)
+    state = with_parts(state, turn=turn)
     return owe_stop(release(forget_in_force(forget_motion(state))))
 
 
@@ -128,7 +129,7 @@ def _on_its_way(
     turn, is_pulled_for_good = watch_pull(
         turn, tai_s, az_deg, _rate_deg_s(state), limits, scale=scale, is_pulled=is_pulled
     )
-    state = state if turn is state.turn else replace(state, turn=turn)
+    state = state if turn is state.turn else with_parts(state, turn=turn)
     if is_pulled_for_good:
         why = "the azimuth moves away from its command, as it would on the other turn"
         return doubt(state, config, events, why), ""
@@ -187,7 +188,7 @@ def _stopped(state: ControlState, status: AcuStatus, config: ControlConfig, even
     )
     state = anew(on_other_turn(state, other_deg - state.intake.az_deg))
     turn = replace(state.turn, phase=Phase.MOVING, move_to_deg=move_to_deg, begun_tai_s=inf)
-    return replace(state, turn=turn)
+    return with_parts(state, turn=turn)
 
 
 def _moved(
@@ -211,14 +212,14 @@ def _moved(
 
 def _under_way(state: ControlState, tai_s: float) -> ControlState:
     """Note when the antenna was seen first in a mode that stops it, or moves it."""
-    return replace(state, turn=replace(state.turn, begun_tai_s=min(state.turn.begun_tai_s, tai_s)))
+    return with_parts(state, turn=replace(state.turn, begun_tai_s=min(state.turn.begun_tai_s, tai_s)))
 
 
 def _settled(state: ControlState, learned_count: int = 0) -> ControlState:
     """The turn is believed again.  learned_count: turns learned by this."""
     count = state.turn.learned_count + learned_count
     turn = replace(at_rest(state.turn), phase=Phase.BELIEVED, move_to_deg=None, learned_count=count)
-    return replace(state, turn=turn)
+    return with_parts(state, turn=turn)
 
 
 def locate_azimuth(
@@ -244,7 +245,7 @@ def locate_azimuth(
         fields = {"az_deg": az_deg, "believed_deg": az_deg - shift_deg, "sector_bit": int(status.is_sector_high)}
         events.append(Event("turn.corrected", fields, is_warning=True))
         new = replace(at_rest(new), learned_count=new.learned_count + 1)
-    return state if new is turn else replace(state, turn=new), az_deg
+    return state if new is turn else with_parts(state, turn=new), az_deg
 
 
 def on_other_turn(state: ControlState, shift_deg: float) -> ControlState:

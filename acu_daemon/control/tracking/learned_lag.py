@@ -3,10 +3,9 @@
 control.tracking.lag has the theory.
 """
 
-from dataclasses import replace
-
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState, Lag
+from acu_daemon.control.with_parts import with_parts
 
 STEADY_SHARE = 0.1  # of a step of the registers: more change than that from one to the next is acceleration
 
@@ -30,12 +29,12 @@ def learn_lag(state: ControlState, az_deg: float, el_deg: float, config: Control
         az=state.lag.az.seen(in_force.az_deg - before.az_deg, in_force.az_deg - az_deg),
         el=state.lag.el.seen(in_force.el_deg - before.el_deg, in_force.el_deg - el_deg),
     )
-    return replace(state, lag=lag)
+    return with_parts(state, lag=lag)
 
 
 def forget_lag(state: ControlState) -> ControlState:
     """Of an axis that failed nothing is kept."""
-    return replace(state, lag=Lag())
+    return with_parts(state, lag=Lag())
 
 
 def _is_steady(before_deg: float, in_force_deg: float, newest_deg: float, step_deg: float) -> bool:

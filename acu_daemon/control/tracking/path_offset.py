@@ -15,6 +15,7 @@ from acu_daemon.control.tracking.causes import is_acquired
 from acu_daemon.control.tracking.search import forget_search
 from acu_daemon.control.tracking.state_table import AUTOTRACKING, TrackState
 from acu_daemon.control.tracking.track_frame import beside, extents, is_within, offset_of
+from acu_daemon.control.with_parts import with_parts
 from acu_daemon.model import Pointing, Reading
 
 GAIN = 0.6  # of the newest reading in the smoothed offset: autotrack pulls in quickly
@@ -25,7 +26,7 @@ def drop_unusable_offset(state: ControlState, refused: str) -> tuple[ControlStat
     offset = state.signal.offset
     if offset is None or isfinite(offset.along_s + offset.across_deg):
         return state, refused
-    return replace(state, signal=replace(state.signal, offset=None)), "offset"
+    return with_parts(state, signal=replace(state.signal, offset=None)), "offset"
 
 
 def forget_other_pass(state: ControlState, sky: Sky) -> ControlState:
@@ -35,12 +36,12 @@ def forget_other_pass(state: ControlState, sky: Sky) -> ControlState:
         return state
     if signal.pass_rise_tai_s is not None:
         state, signal = forget_search(state), Signal()
-    return replace(state, signal=replace(signal, pass_rise_tai_s=sky.plan.rise_tai_s))
+    return with_parts(state, signal=replace(signal, pass_rise_tai_s=sky.plan.rise_tai_s))
 
 
 def resume_pass(state: ControlState) -> ControlState:
     """The pass was acquired before the daemon was started again."""
-    return replace(state, signal=replace(state.signal, has_acquired=True))
+    return with_parts(state, signal=replace(state.signal, has_acquired=True))
 
 
 def learn_of_signal(state: ControlState, given: TickInput, config: ControlConfig, events: list[Event]) -> ControlState:
@@ -52,7 +53,7 @@ def learn_of_signal(state: ControlState, given: TickInput, config: ControlConfig
     if not is_acquired(seen.status) or track not in AUTOTRACKING:
         if signal.acquired_since_tai_s is None:
             return state
-        return replace(state, signal=replace(signal, acquired_since_tai_s=None))
+        return with_parts(state, signal=replace(signal, acquired_since_tai_s=None))
     since_tai_s = signal.acquired_since_tai_s or tai_s
     has_locked = signal.has_locked or tai_s - since_tai_s >= config.lock_dwell_s
     new = signal
@@ -60,7 +61,7 @@ def learn_of_signal(state: ControlState, given: TickInput, config: ControlConfig
         new = replace(signal, acquired_since_tai_s=since_tai_s, has_acquired=True, has_locked=has_locked)
     if track is TrackState.AUTOTRACK_TLE and seen.is_in_step:
         new = _learn_offset(new, seen.reading, given.sky, config, events)
-    return state if new is signal else replace(state, signal=new)
+    return state if new is signal else with_parts(state, signal=new)
 
 
 def _learn_offset(signal: Signal, reading: Reading, sky: Sky, config: ControlConfig, events: list[Event]) -> Signal:

@@ -12,6 +12,7 @@ from acu_daemon.control.tick_input import TickInput
 from acu_daemon.control.tracking.scan import covered_text, go_on, needed_s
 from acu_daemon.control.tracking.state_table import AUTOTRACKING, TrackState
 from acu_daemon.control.tracking.track_frame import extents
+from acu_daemon.control.with_parts import with_parts
 from acu_daemon.model import Prediction
 
 LONGEST_STEP_S = 0.3  # after a gap in the readings nobody knows what was seen
@@ -38,7 +39,7 @@ def search(
     if not is_searching or prediction is None or reading is None:
         return state
     if not was_searching:
-        state = replace(state, search=Search(replace(state.search.scan, is_aimed=False), reading.tai_s))
+        state = with_parts(state, search=Search(replace(state.search.scan, is_aimed=False), reading.tai_s))
         events.append(_begins(state.search.scan, prediction, now_tai_s, config))
     dt_s = reading.tai_s - state.search.scanned_tai_s
     if was_searching and (dt_s == 0.0 or not given.seen.is_in_step):
@@ -47,12 +48,12 @@ def search(
     if scan.round_count > state.search.scan.round_count:
         fields = {"covered": covered_text(state.search.scan, prediction, config), "action": "begun again"}
         events.append(Event("search.covered", fields, is_warning=True))
-    return replace(state, search=Search(scan, reading.tai_s))
+    return with_parts(state, search=Search(scan, reading.tai_s))
 
 
 def forget_search(state: ControlState) -> ControlState:
     """The next search begins at the path."""
-    return replace(state, search=replace(state.search, scan=Scan()))
+    return with_parts(state, search=replace(state.search, scan=Scan()))
 
 
 def _begins(scan: Scan, prediction: Prediction, now_tai_s: float, config: ControlConfig) -> Event:

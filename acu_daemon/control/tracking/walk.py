@@ -18,6 +18,7 @@ from acu_daemon.control.tracking.causes import find_causes
 from acu_daemon.control.tracking.hills import hidden_until_tai_s, is_hidden
 from acu_daemon.control.tracking.late_arrival import lateness
 from acu_daemon.control.tracking.state_table import HOLDING, Cause, TrackState, transition
+from acu_daemon.control.with_parts import with_parts
 
 HIDDEN = (Cause.HIDDEN, Cause.HIDDEN_FITTED)
 ALARMS = (TrackState.LINK_LOST, TrackState.FAULT, TrackState.SEARCH)
@@ -31,7 +32,7 @@ def walk(state: ControlState, given: TickInput, config: ControlConfig, events: l
         tracking = replace(tracking, hold_from_tai_s=now_tai_s)
     step = transition(tracking.track, causes)
     if step is None:
-        return state if tracking is state.tracking else replace(state, tracking=tracking)
+        return state if tracking is state.tracking else with_parts(state, tracking=tracking)
     before, (track, cause) = tracking.track, step
     fields: dict[str, object] = {"state": str(track), "before": str(before), "cause": str(cause)}
     if cause in HIDDEN and (until_tai_s := hidden_until_tai_s(given.sky, now_tai_s)) is not None:
@@ -42,7 +43,7 @@ def walk(state: ControlState, given: TickInput, config: ControlConfig, events: l
     begins_hold = track in HOLDING and before not in HOLDING
     hold_from_tai_s = now_tai_s if begins_hold else tracking.hold_from_tai_s
     tracking = replace(tracking, track=track, entered_tai_s=now_tai_s, hold_from_tai_s=hold_from_tai_s)
-    state = replace(state, tracking=tracking)
+    state = with_parts(state, tracking=tracking)
     if track is TrackState.LINK_LOST:
         state = doubt_place(forget_motion(forget_writes(forget_asked(begin_after_lost_link(state)))))
     return state
