@@ -9,7 +9,9 @@ from test_tick import AZ_DEG, CONFIG, EL_DEG, NOW, PLAN, SKY, path, ready, saw, 
 
 from acu_daemon.acu.commands import AcuMode, Backup, ReadFaults
 from acu_daemon.acu.replies import AcuStatus
+from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.orders import Orders
+from acu_daemon.control.safety.axis_watch import Bounds
 from acu_daemon.control.state import ControlState, Held, Sent
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Exchange, Observation, Sky, TickInput
@@ -35,13 +37,15 @@ def standing(right_deg: float, up_deg: float) -> Sky:
     return Sky(Prediction(NOW - 5.0, 0.1, az, el, t, t, az, t, "FITTED", NOW), None, PLAN)
 
 
-def ticks(state: ControlState, statuses: list[AcuStatus], sky: Sky) -> tuple[ControlState, list[Orders]]:
+def ticks(
+    state: ControlState, statuses: list[AcuStatus], sky: Sky, config: ControlConfig = CONFIG
+) -> tuple[ControlState, list[Orders]]:
     """One tick for each status, at the period."""
     ordered = []
     for k, seen in enumerate(statuses):
         now = NOW + 0.1 * k
         reading = Reading(now - 0.09, seen.az_deg, seen.el_deg, seen.is_acquired)
-        state, orders = tick(state, TickInput(Observation(reading, seen), sky, now), CONFIG)
+        state, orders = tick(state, TickInput(Observation(reading, seen), sky, now), config)
         ordered.append(orders)
     return state, ordered
 
@@ -61,6 +65,20 @@ def test_an_axis_that_stands_is_excused_by_the_switch_on_its_commands_side_and_b
     name = "azimuth" if right else "elevation"
     excused = switch is not None and ENDS[switch] == SIDES[side]
     assert state.latch.problem == ("" if excused else f"{name} stands still away from its command")
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("mode", [AcuMode.REMOTE_BACKUP, AcuMode.STANDBY])
+def test_where_following_is_not_watched_no_axis_is_latched_whatever_it_does(mode: AcuMode, side: str) -> None:
+    """following_error_s = 0."""
+    right, up = SIDES[side]
+    before = remembering(ready(TrackState.HOLD_FITTED, status(AcuMode.REMOTE_BACKUP)), hold_from_tai_s=NOW)
+    strays = [replace(status(mode), az_deg=AZ_DEG - 0.5 * k * right, el_deg=EL_DEG - 0.3 * k * up) for k in range(60)]
+    for seen in ([status(mode)] * 60, strays):
+        for error_s, is_latched in ((0.0, False), (0.5, True)):
+            config = replace(CONFIG, following=Bounds(1.0, error_s))
+            state, _ = ticks(before, seen, standing(6.0 * right, 6.0 * up), config)
+            assert bool(state.latch.problem) is (is_latched and (mode is AcuMode.REMOTE_BACKUP or seen is strays))
 
 
 @pytest.mark.parametrize("switch", [*ENDS, None])

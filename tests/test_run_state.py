@@ -188,6 +188,23 @@ def test_p10_what_a_full_disk_refused_is_written_again_though_nothing_changes(tm
     assert keeper.problem == ""
 
 
+@pytest.mark.parametrize(("problem", "count"), [("", 0), ("a full disk", 3)])
+def test_p10_what_a_full_disk_refused_is_tried_again_each_second_and_not_each_tick(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, problem: str, count: int
+) -> None:
+    writer = Writer("files")
+    keeper = RunStateKeeper(tmp_path, writer, STATE, lambda _: None)
+    state = remembering(track=TrackState.HOLD_FITTED, by_people=True)
+    keeper.see(state)
+    assert writer.close(60.0)
+    offered: list[Any] = []
+    monkeypatch.setattr(keeper._latest, "offer", offered.append)
+    keeper.problem = problem
+    for _ in range(3 * RETRY_TICKS):
+        keeper.see(state)
+    assert len(offered) == count
+
+
 @pytest.mark.parametrize(
     ("left_s", "now_s", "is_another"),
     [(5.0, 5.9, False), (5.0, 6.1, True), (None, None, False), (5.0, None, False), (None, 5.0, False)],
