@@ -1,6 +1,8 @@
 """The order of a start against a small ACU: nothing is written before the present angles, and those are read back."""
 
 from dataclasses import replace
+from itertools import product
+from typing import Any
 
 import pytest
 from memories import remembering
@@ -8,6 +10,7 @@ from memories import remembering
 from acu_daemon.acu.commands import (
     READS,
     AcuMode,
+    Backup,
     Command,
     FreeTurnChoice,
     Identify,
@@ -15,13 +18,17 @@ from acu_daemon.acu.commands import (
     ReadCommanded,
     ReadFaults,
     ReadTurnChoice,
+    ReadWatchdog,
+    SelectBackup,
+    SelectMode,
+    SetWatchdog,
     Stop,
 )
-from acu_daemon.acu.replies import AcuStatus, Commanded, Done, Refused, Reply, TurnChoice
+from acu_daemon.acu.replies import AcuIdentity, AcuStatus, Commanded, Done, Refused, Reply, TurnChoice, WatchdogTime
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.arming import last_command
 from acu_daemon.control.startup import after_reply, next_command
-from acu_daemon.control.state import ControlState, StartStage
+from acu_daemon.control.state import ControlState, StartStage, Watchdog
 from acu_daemon.control.tick_input import Exchange
 from acu_daemon.drivers.sa3842.angles import LSB_DEG
 from acu_daemon.drivers.sa3842.field_status import read_field_status
@@ -237,3 +244,83 @@ def test_a_rehearsal_gets_on_only_with_an_acu_that_surely_is_simulated(
     assert state.startup.stage is stage
     wanted = Stop() if stage is StartStage.IDENTIFIED else None
     assert last_command(remembering(state, status=status()), config) == wanted
+
+
+# Every reply to everything, at every stage
+
+NOW_S, WATCHED = 8.4e8, replace(CONFIG, register_watchdog_s=2.0)
+SIMULATED, UNKNOWN = AcuIdentity("a", True, True), AcuIdentity("b", False, True)
+ASKED = (
+    *(Identify(), ReadCommanded(), ReadTurnChoice(), FreeTurnChoice(), PointAt(10.0, 20.0), ReadWatchdog()),
+    *(SetWatchdog(2.0), SetWatchdog(0.0), Stop(), SelectBackup(Backup.REMOTE), SelectMode(AcuMode.REMOTE)),
+)
+REPLIES = (
+    *(None, Done(), Refused(), SIMULATED, UNKNOWN, Commanded(10.0, 20.0), Commanded(10.1, 20.0), Commanded(10.0, 20.1)),
+    *(TurnChoice(True), TurnChoice(False), WatchdogTime(2.0), WatchdogTime(2.02), WatchdogTime(0.0)),
+)
+WITHOUT_CONDITION = {  # stage, what was asked, and the reply: the next stage
+    (StartStage.NEW, Identify(), SIMULATED): StartStage.IDENTIFIED,
+    (StartStage.REGISTERS_KNOWN, ReadTurnChoice(), TurnChoice(True)): StartStage.SECTOR_FREE,
+    (StartStage.REGISTERS_KNOWN, FreeTurnChoice(), Done()): StartStage.SECTOR_FREE,
+    (StartStage.SECTOR_FREE, PointAt(10.0, 20.0), Done()): StartStage.PRESENT_WRITTEN,
+    (StartStage.PRESENT_WRITTEN, ReadCommanded(), Commanded(10.0, 20.0)): StartStage.READY,
+    (StartStage.PRESENT_WRITTEN, ReadCommanded(), Commanded(10.1, 20.0)): StartStage.SECTOR_FREE,
+    (StartStage.PRESENT_WRITTEN, ReadCommanded(), Commanded(10.0, 20.1)): StartStage.SECTOR_FREE,
+    **{
+        (StartStage.IDENTIFIED, ReadCommanded(), one): StartStage.REGISTERS_KNOWN
+        for one in REPLIES
+        if isinstance(one, Commanded)
+    },
+}
+
+
+def watchdog_after(
+    asked: Any, reply: Any, before: Watchdog, stage: StartStage, *, is_refused: bool, tried_s: float
+) -> Watchdog:
+    """What is known of the watchdog."""
+    if asked == Stop() and reply == Done() and before is Watchdog.UNKNOWN:
+        return Watchdog.SET  # whether it was set was not read back: it is cleared
+    if asked == SetWatchdog(0.0):
+        return Watchdog.UNKNOWN if reply == Done() or is_refused else before
+    if asked in (ReadWatchdog(), SetWatchdog(2.0)):
+        if reply == WatchdogTime(2.0):
+            return Watchdog.SET
+        return Watchdog.REFUSED if is_refused or tried_s >= 2.0 else before
+    is_forgotten = isinstance(asked, SelectBackup) and reply == Done() and stage is StartStage.READY
+    return Watchdog.UNKNOWN if is_forgotten and before is Watchdog.SET else before
+
+
+@pytest.mark.parametrize("is_remote", [False, True])
+@pytest.mark.parametrize("tried_s", [None, 1.9, 2.0])
+def test_each_reply_to_each_question_at_each_stage_moves_the_start_by_what_the_table_says(
+    tried_s: float | None, is_remote: bool
+) -> None:
+    seen = AcuStatus(10.0, 20.0, AcuMode.STANDBY, is_remote_enabled=is_remote)
+    for stage, asked, reply, watchdog in product(StartStage, ASKED, REPLIES, Watchdog):
+        from_tai_s = None if tried_s is None else NOW_S - tried_s
+        before = remembering(
+            status=seen,
+            stage=stage,
+            watchdog=watchdog,
+            watchdog_from_tai_s=from_tai_s,
+            present_deg=(10.0, 20.0),
+        )
+        after = after_reply(before, Exchange(asked, reply), NOW_S, WATCHED, []).startup
+        is_refused = reply == Refused() and is_remote
+        expected = WITHOUT_CONDITION.get((stage, asked, reply), stage)
+        if is_refused and (stage, asked) == (StartStage.REGISTERS_KNOWN, FreeTurnChoice()):
+            expected = StartStage.SECTOR_FREE
+        case = (stage, asked, reply, watchdog)
+        assert after.stage is expected, case
+        age_s = tried_s or 0.0
+        known = watchdog_after(asked, reply, watchdog, stage, is_refused=is_refused, tried_s=age_s)
+        assert after.watchdog is known, case
+        is_tried = asked in (ReadWatchdog(), SetWatchdog(2.0))
+        is_over = is_tried and (reply == WatchdogTime(2.0) or is_refused or age_s >= 2.0)
+        begun = NOW_S if is_tried and from_tai_s is None else from_tai_s
+        assert after.watchdog_from_tai_s == (None if is_over else begun), case
+        is_identified = (stage, asked) == (StartStage.NEW, Identify()) and isinstance(reply, AcuIdentity)
+        assert after.identity == (reply if is_identified else None), case
+        assert after.is_identity_sure is (is_identified and reply == SIMULATED), case
+        is_present = (stage, asked, reply) == (StartStage.SECTOR_FREE, PointAt(10.0, 20.0), Done())
+        assert after.present_deg == (10.0, 20.0) or not is_present, case
