@@ -46,12 +46,13 @@ from acu_daemon.edge.link import check_rate, make_link
 from acu_daemon.edge.state_directory import SNAPSHOT, choice_text, folders_in, older_folders, state_path, with_choice
 from acu_daemon.edge.weather import WeatherReader
 from acu_daemon.errors import AcuDaemonError, LinkError, OrbitError, UsageError
-from acu_daemon.model import Site
+from acu_daemon.model import Pass, Site
 from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.propagator import is_ephemeris
 from acu_daemon.orbit.sun import RISEN_EL_DEG, sun_direction_deg
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.orbit.visibility import why_none
+from acu_daemon.pointing.outage import kept_out, sun_outages
 from acu_daemon.pointing.wrap import middle_deg
 from acu_daemon.units import DAY_S, wrap_180
 
@@ -304,10 +305,22 @@ def _next_pass(name: str, target: Target, now_tai_s: float) -> Iterator[Finding]
         yield Finding(GO, f"{name}: cable wrap", f"the pass is held from azimuth {plan.start_az_deg:.1f} deg on")
     for one in plan.beyond:
         yield Finding(WARN, f"{name}: {one.axis}", str(one))
+    yield from _outages(name, target, coming)
     lead_s, left_s = longest_lead(target), coming.rise_tai_s - now_tai_s
     if 0.0 < left_s < lead_s:
         why = f"the rise is in {left_s:.0f} s, from the far end of its drives the antenna needs {lead_s:.0f} s"
         yield Finding(WARN, f"{name}: approach", f"{why}: it may be late, `run` says by how much")
+
+
+def _outages(name: str, target: Target, coming: Pass) -> Iterator[Finding]:
+    """The sun and keep-out zones in a pass."""
+    bounds, policy = target.station.bounds, target.station.envelope.sun_policy
+    propagator, site = target.elements.propagator, target.station.site
+    led = "; it is led around" if policy == "avoid" else "; it is followed (sun_policy)"
+    for outage in sun_outages(propagator, site, bounds.sun, coming):
+        yield Finding(WARN, f"{name}: sun", f"{outage}{led}")
+    for kept in kept_out(propagator, site, bounds.keep_outs, coming):
+        yield Finding(WARN, f"{name}: keep-out", f"{kept}; it is led around")
 
 
 async def _acu(station: StationFile) -> list[Finding]:

@@ -29,6 +29,7 @@ from acu_daemon.orbit.propagator import is_ephemeris, spans_tai_s
 from acu_daemon.orbit.selection import nearest_epoch_tai_s
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.orbit.visibility import why_none
+from acu_daemon.pointing.outage import KeptOut, SunOutage, kept_out, sun_outages
 from acu_daemon.pointing.reach import OutOfReach
 from acu_daemon.units import DAY_S
 
@@ -42,6 +43,8 @@ class _Seen:
     passes: list[Pass]
     epochs_tai_s: dict[Pass, float]  # of the elements that each is computed from
     beyond: dict[Pass, tuple[OutOfReach, ...]]  # when which axis cannot follow
+    sun: dict[Pass, tuple[SunOutage, ...]]  # when it is near the sun
+    zones: dict[Pass, tuple[KeptOut, ...]]  # when it is in a keep-out zone
     why_none: str
     said: list[str]
 
@@ -68,7 +71,8 @@ def command(
     """Show the passes above the station's lowest elevation: rise, duration, culmination, set.
 
     Where the limits of an axis do not hold a pass, its line says which axis cannot follow, from when, for how long;
-    where a hill of `[envelope] mask` hides it in its midst, from when and for how long.
+    where a hill of `[envelope] mask` hides it in its midst, where it comes near the sun, how near, and where it is in a
+    keep-out zone, from when and for how long.
 
     Of several element sets of a satellite in its file, each pass is computed from the one nearest to it in time.
 
@@ -129,11 +133,15 @@ def _search(config: Path, name: str, start_tai_s: float, end_tai_s: float) -> _S
     beyond = {
         one: beyond_limits(of.elements.propagator, site, one, *limits) for of, of_set in by_epoch for one in of_set
     }
+    bounds = target.station.bounds
+    of_pass = {one: of.elements.propagator for of, of_set in by_epoch for one in of_set}
     epochs_tai_s = {one: of.elements.epoch_tai_s for of, of_set in by_epoch for one in of_set}
     return _Seen(
         found,
         epochs_tai_s,
         beyond,
+        {one: sun_outages(of, site, bounds.sun, one) for one, of in of_pass.items()},
+        {one: kept_out(of, site, bounds.keep_outs, one) for one, of in of_pass.items()},
         "" if is_told else why_none(propagator, site, start_tai_s, end_tai_s, lowest_deg),
         said,
     )
@@ -163,14 +171,15 @@ def passes_by_epoch(
 def _show(
     seen: dict[str, _Seen], omitted: dict[str, str], start_tai_s: float, end_tai_s: float, *, as_json: bool
 ) -> None:
-    rows = [(name, one, of.beyond.get(one, ())) for name, of in seen.items() for one in of.passes]
+    rows = [(name, one) for name, of in seen.items() for one in of.passes]
     rows.sort(key=lambda row: row[1].rise_tai_s)
     if as_json:
         passes = [
             _as_json(name, one, start_tai_s, end_tai_s)
             | {"elements_epoch_utc": utc_text(seen[name].epochs_tai_s[one])}
-            | _beyond(beyond)
-            for name, one, beyond in rows
+            | _beyond(seen[name].beyond[one])
+            | _outages(seen[name].sun[one], seen[name].zones[one])
+            for name, one in rows
         ]
         left_out = [{"satellite": name, "reason": reason} for name, reason in omitted.items()]
         typer.echo(json.dumps({"passes": passes, "omitted": left_out} if omitted else passes, indent=1))
@@ -188,9 +197,11 @@ def _show(
             set_az="set az",
         )
     )
-    for name, one, beyond in rows:
+    for name, one in rows:
+        of = seen[name]
         hidden = (_hidden_text(*span) for span in one.hidden_tai_s)
-        said = (open_ends(one, start_tai_s, end_tai_s), *hidden, *map(_beyond_text, beyond))
+        outages = map(str, (*of.sun[one], *of.zones[one]))
+        said = (open_ends(one, start_tai_s, end_tai_s), *hidden, *outages, *map(_beyond_text, of.beyond[one]))
         notes = [text for text in said if text]
         typer.echo(f"{_as_text(name, one)}  {'; '.join(notes)}".rstrip())
     for name, of in seen.items():
@@ -237,6 +248,25 @@ def _beyond(beyond: tuple[OutOfReach, ...]) -> dict[str, Any]:
     }
 
 
+def _outages(sun: tuple[SunOutage, ...], zones: tuple[KeptOut, ...]) -> dict[str, Any]:
+    return {
+        "sun": [
+            _span(one.from_tai_s, one.to_tai_s)
+            | {"least_deg": round(one.least_deg, 3), "least_utc": utc_text(one.least_tai_s)}
+            for one in sun
+        ],
+        "keep_outs": [_span(one.from_tai_s, one.to_tai_s) | {"name": one.name} for one in zones],
+    }
+
+
+def _span(from_tai_s: float, to_tai_s: float) -> dict[str, Any]:
+    return {
+        "from_utc": utc_text(from_tai_s),
+        "to_utc": utc_text(to_tai_s),
+        "duration_s": round(to_tai_s - from_tai_s, 3),
+    }
+
+
 def _as_json(name: str, one: Pass, start_tai_s: float, end_tai_s: float) -> dict[str, Any]:
     return {
         "satellite": name,
@@ -250,8 +280,5 @@ def _as_json(name: str, one: Pass, start_tai_s: float, end_tai_s: float) -> dict
         "set_az_deg": round(one.set_az_deg, 3),
         "does_not_rise": one.rise_tai_s == start_tai_s,
         "does_not_set": one.set_tai_s == end_tai_s,
-        "hidden": [
-            {"from_utc": utc_text(begin), "to_utc": utc_text(end), "duration_s": round(end - begin, 3)}
-            for begin, end in one.hidden_tai_s
-        ],
+        "hidden": [_span(*span) for span in one.hidden_tai_s],
     }

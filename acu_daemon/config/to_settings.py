@@ -41,6 +41,7 @@ def control_config(
         is_armed=station.safety.arm == "auto",
         register_watchdog_s=station.safety.register_watchdog_s if driver.capabilities.has_register_watchdog else 0.0,
         acu=driver.capabilities,
+        response_time_s=station.envelope.response_time_s,
         clock_alarm_deg=station.safety.clock_alarm_beam_fraction * station.receiver.beamwidth_deg,
         following=Bounds(station.safety.following_error_deg, station.safety.following_error_s),
     )

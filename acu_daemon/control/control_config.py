@@ -36,6 +36,7 @@ class ControlConfig:
     register_watchdog_s: float = 0.0  # what the ACU's is set to; 0: it is not touched
     following: Bounds = Bounds()
     acu: Capabilities = Capabilities()
+    response_time_s: float = 60.0  # an antenna that may not be moved, and that the sun reaches within it, is an alarm
     clock_alarm_deg: float = 0.1  # an error of UTC counts from here on, at the sky's present rate
 
     @property

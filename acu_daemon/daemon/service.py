@@ -29,6 +29,8 @@ from acu_daemon.edge.fit import FitRunner
 from acu_daemon.edge.link import Link
 from acu_daemon.errors import NoAcuError, UsageError
 from acu_daemon.model import FitResult, Pass, Reading
+from acu_daemon.orbit.timescales import utc_text
+from acu_daemon.pointing.outage import kept_out, sun_outages
 
 FIRST_POLL_S = 10.0  # no good poll within this of the start ends the run
 LOOK_TICKS = 10
@@ -255,6 +257,14 @@ class Service:
             self._log.warning("pass.wrap", note=plan.note)
         for one in plan.beyond:
             self._log.warning("pass.beyond_limits", axis=one.axis, for_s=round(one.duration_s, 1), what=str(one))
+        envelope = axes.envelope
+        for outage in sun_outages(job.refit.propagator, job.refit.site, envelope.sun, job.coming):
+            policy = envelope.sun.policy if envelope.sun else ""
+            self._log.warning("pass.sun", least_deg=round(outage.least_deg, 2), policy=policy, what=str(outage))
+        for kept in kept_out(job.refit.propagator, job.refit.site, envelope.keep_outs, job.coming):
+            self._log.warning("pass.keep_out", zone=kept.name, for_s=round(kept.duration_s, 1), what=str(kept))
+        for begin, end in job.coming.hidden_tai_s:
+            self._log.info("pass.hidden", from_utc=utc_text(begin, 0), for_s=round(end - begin, 1))
         self._background.set_plan(plan)
 
     async def _safe_stop(self) -> bool:

@@ -90,6 +90,11 @@ class Snapshot:
     rise_in_s: float | None = None  # negative: the pass has begun
     set_in_s: float | None = None
     culmination_deg: float | None = None
+    sun_deg: float | None = None  # between boresight and sun; None where sun_policy is off
+    sun_reach_s: float | None = None  # until the sun's keep-out is where the antenna stands; None: not within an hour
+    way_out_az_deg: float | None = None  # where it could stand clear of the sun
+    way_out_el_deg: float | None = None
+    envelope_alarm: str = ""  # an antenna that the daemon may not move, or does not, before a keep-out
     is_hidden: bool = False  # the path is behind the mask, and nothing is heard
     hidden_s: float | None = None  # until it comes out again, while it is
 

@@ -10,6 +10,7 @@ from acu_daemon.control.tracking.off_path import off_path
 from acu_daemon.control.tracking.scan import covered_text
 from acu_daemon.control.tracking.state_table import AUTOTRACKING, TrackState
 from acu_daemon.daemon.area import CommonArea
+from acu_daemon.daemon.envelope_watch import look_around
 from acu_daemon.daemon.foreground import Foreground
 from acu_daemon.daemon.port import AcuPort
 from acu_daemon.daemon.snapshot import Snapshot, Subject
@@ -59,6 +60,15 @@ def take_snapshot(
     if not seen.is_acquired and is_hidden(area.sky, now_tai_s, control):
         until_tai_s = hidden_until_tai_s(area.sky, now_tai_s)
         seen = replace(seen, is_hidden=True, hidden_s=None if until_tai_s is None else until_tai_s - now_tai_s)
+    around = look_around(state, now_tai_s, control)
+    seen = replace(
+        seen,
+        sun_deg=around.sun_deg,
+        sun_reach_s=around.sun_reach_s,
+        way_out_az_deg=around.way_out[0] if around.way_out else None,
+        way_out_el_deg=around.way_out[1] if around.way_out else None,
+        envelope_alarm=around.alarm,
+    )
     return replace(seen, verdict=verdict(seen).word)
 
 

@@ -56,6 +56,9 @@ def verdict(seen: Snapshot) -> Verdict:
         return _tracking(seen)
     if state is S.ZENITH:
         return Verdict("OVER ZENITH", Level.CALM, "the azimuth drive cannot follow here: the antenna is led past it")
+    if state is S.AVOID:
+        why = seen.limit_alarm or "the path is clear again at once"
+        return Verdict("AVOIDING", Level.WATCH, f"a keep-out is on the path, the antenna is led clear of it: {why}")
     return _blind(seen, state)
 
 
@@ -145,6 +148,7 @@ def alarms(seen: Snapshot) -> list[str]:
         seen.acu_faults,
         (seen.link_problem or "no link") if not seen.is_link_up else "",
         hands,
+        seen.envelope_alarm,
         seen.encoder_problem,
         seen.turn_alarm,
         seen.limit_alarm,

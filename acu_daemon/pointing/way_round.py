@@ -89,15 +89,20 @@ def moved_out(envelope: Envelope, place: Place, tai_s: float) -> Place | None:
         return place
     if place[1] > 90.0:
         return None
-    beam = envelope.beam_deg(*place)
     allowed = (
         one
-        for one in (_encoders(place, beam, at) for at in _around(zone, beam))
+        for one in places_about(envelope, place, zone)
         if envelope.room_deg(*one, tai_s) >= 0.0 and envelope.clearance_deg(*one, tai_s) >= LEAST_CLEAR_DEG
     )
     if isinstance(zone, Disc):  # they come the nearest first
         return next(allowed, None)
     return min(allowed, key=lambda one: sky_angle_deg(*place, *one), default=None)
+
+
+def places_about(envelope: Envelope, place: Place, zone: Zone) -> Iterator[Place]:
+    """Places on the rim of a zone, about a disc the nearest first."""
+    beam = envelope.beam_deg(*place)
+    return (_encoders(place, beam, at) for at in _around(zone, beam))
 
 
 def _around(zone: Zone, beam: Place) -> Iterator[Place]:

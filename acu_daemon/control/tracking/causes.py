@@ -14,6 +14,7 @@ from acu_daemon.control.tracking.pass_plan import pass_end_tai_s
 from acu_daemon.control.tracking.register_limiter import within_limits
 from acu_daemon.control.tracking.state_table import HOLDING, LED, Cause, TrackState
 from acu_daemon.control.tracking.track_frame import extents, is_within, offset_of
+from acu_daemon.control.tracking.zone_watch import nears_zone
 from acu_daemon.model import Pointing, sky_angle_deg
 from acu_daemon.pointing.wrap import nearest_turn
 
@@ -21,6 +22,7 @@ ON_POINT_BEAMS = 0.25
 HEARD_BEAMS = 1.0  # a signal that is heard so near to the path is the satellite's
 RESUME_DEG = 5.0  # an antenna this near to the path goes on from an interruption without a new approach
 BEFORE = frozenset({TrackState.IDLE, TrackState.PREPOSITION})  # only there it matters where the antenna stands
+TO_AUTOTRACK = frozenset({Cause.ON_POINT, Cause.ON_POINT_FITTED, Cause.STILL_FITTED, Cause.STILL_SELECTED})
 TAKEOVER_S, GIVE_BACK_S = 2.0, 0.5  # before the departure, and after the return: a crossing of the zenith
 CHANGED_S = 3.0  # by which a fit may put off a crossing that the antenna was taken over for
 TAKEOVER_RATES = 1.2  # of the drive's rate: what autotrack cannot follow
@@ -42,7 +44,17 @@ def find_causes(state: ControlState, given: TickInput, config: ControlConfig) ->
         causes |= _of_plan(state, status, given, config)
         causes |= _of_time(state, status, given, config)
         causes |= _of_zenith(state, given, config)
+        causes = _of_zones(causes, state, given, config)
     return causes
+
+
+def _of_zones(causes: set[Cause], state: ControlState, given: TickInput, config: ControlConfig) -> set[Cause]:
+    """Before a keep-out no mode is gone back to that follows the signal."""
+    if not config.envelope.has_zones:
+        return causes
+    if not nears_zone(state, given.sky, given.now_tai_s, config):
+        return causes | {Cause.KEEP_OUT_PAST}
+    return causes - TO_AUTOTRACK | {Cause.KEEP_OUT}
 
 
 def _of_zenith(state: ControlState, given: TickInput, config: ControlConfig) -> set[Cause]:

@@ -20,6 +20,8 @@ from acu_daemon.model import Pointing, Reading
 
 GAIN = 0.6  # of the newest reading in the smoothed offset: autotrack pulls in quickly
 
+OFFSET_STATES = (TrackState.AUTOTRACK_TLE, TrackState.HOLD_TLE, TrackState.ZENITH, TrackState.AVOID)
+
 
 def drop_unusable_offset(state: ControlState, refused: str) -> tuple[ControlState, str]:
     """An offset that is not finite carries no path.  refused: what else of a tick's input is not finite."""
@@ -92,6 +94,6 @@ def learned_point(state: ControlState, sky: Sky, tai_s: float, *, follow: bool) 
     offset, prediction = state.signal.offset, sky.prediction
     if offset is None or prediction is None or offset.model is not prediction.model:
         return None
-    if state.tracking.track not in (TrackState.AUTOTRACK_TLE, TrackState.HOLD_TLE, TrackState.ZENITH):
+    if state.tracking.track not in OFFSET_STATES:
         return None
     return beside(prediction, tai_s, (offset.along_s, offset.across_deg), follow=follow)

@@ -21,6 +21,7 @@ class TrackState(StrEnum):
     HOLD_TLE = "HOLD/TLE"
     SEARCH = "SEARCH"
     ZENITH = "ZENITH"
+    AVOID = "AVOID"
     MANUAL = "MANUAL"
     STOW = "STOW"
     FAULT = "FAULT"
@@ -51,6 +52,8 @@ class Cause(StrEnum):
     FIT = "a fit was accepted"
     FIT_LEFT = "newer readings deny the fit: the prediction is made from the elements again"
     LOST = "the signal is lost"
+    KEEP_OUT = "the path, or the antenna, comes near a keep-out"
+    KEEP_OUT_PAST = "the keep-out is behind"
     HIDDEN = "the satellite is behind the mask"
     HIDDEN_FITTED = "the satellite is behind the mask, and a fit of this pass exists"
     MODE_LEFT = "the ACU left the mode by itself (power cycle, or another hand)"
@@ -67,13 +70,13 @@ S = TrackState
 ACTIVE = frozenset(
     {
         S.PREPOSITION,
-        *(S.ACQUIRE_TLE, S.AUTOTRACK_TLE, S.AUTOTRACK_FITTED, S.HOLD_FITTED, S.HOLD_TLE, S.SEARCH, S.ZENITH),
+        *(S.ACQUIRE_TLE, S.AUTOTRACK_TLE, S.AUTOTRACK_FITTED, S.HOLD_FITTED, S.HOLD_TLE, S.SEARCH, S.ZENITH, S.AVOID),
     }
 )
-TRACKING = ACTIVE - {S.PREPOSITION}
+TRACKING = ACTIVE - {S.PREPOSITION, S.AVOID}
 HOLDING = frozenset({S.HOLD_FITTED, S.HOLD_TLE})
 AUTOTRACKING = frozenset({S.AUTOTRACK_TLE, S.AUTOTRACK_FITTED})
-LED = frozenset({S.PREPOSITION, S.ZENITH})  # by the registers alone: autotrack is not selected
+LED = frozenset({S.PREPOSITION, S.ZENITH, S.AVOID})  # by the registers alone: autotrack is not selected
 ANY = frozenset(TrackState)
 NO_LINK = frozenset({S.LINK_LOST})
 
@@ -100,6 +103,8 @@ TABLE: tuple[Row, ...] = (
     Row(frozenset({S.STOW}), Cause.STOW_LEFT, S.IDLE),
     Row(ACTIVE, Cause.PASS_OVER, S.IDLE, "set of the pass"),
     Row(ACTIVE, Cause.HANDS_OFF, S.IDLE),
+    Row(TRACKING, Cause.KEEP_OUT, S.AVOID, "4 s before the keep-out"),
+    Row(frozenset({S.AVOID}), Cause.KEEP_OUT_PAST, S.IDLE),
     Row(frozenset({S.IDLE, S.PREPOSITION}), Cause.ACQUIRED_FITTED, S.AUTOTRACK_FITTED),
     Row(frozenset({S.IDLE, S.PREPOSITION}), Cause.ACQUIRED, S.AUTOTRACK_TLE),
     Row(frozenset({S.IDLE}), Cause.STILL_FITTED, S.HOLD_FITTED),
