@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acu_daemon.config.load import load_satellite, load_station, satellite_names
-from acu_daemon.config.problems import in_words
+from acu_daemon.config.problems import KINDS, in_words
 from acu_daemon.config.to_settings import control_config, driver_of, estimator_settings
 from acu_daemon.errors import ConfigError
 from acu_daemon.orbit.timescales import tai_from_utc
@@ -200,8 +200,12 @@ SATELLITE_MISTAKES = [
     ("eccentricity = 0.0436", "eccentricity = 1.0", "elements.eccentricity = 1.0: expected less than 1"),
     ("7180.0", "nan", "elements.semi_major_axis_km = nan: expected a finite number"),
     ("7180.0", "7e120", "elements.semi_major_axis_km = 7e+120: expected at most 1e+06"),
-    ('kind = "brouwer"', 'kind = "sgp4"', 'elements.kind = "sgp4": expected one of tle, omm, oem, cpf, sp3, brouwer'),
-    ('kind = "brouwer"', "kind = 4", 'elements.kind = "4": expected one of tle, omm, oem, cpf, sp3, brouwer'),
+    (
+        'kind = "brouwer"',
+        'kind = "sgp4"',
+        'elements.kind = "sgp4": expected one of tle, omm, oem, cpf, sp3, station, brouwer',
+    ),
+    ('kind = "brouwer"', "kind = 4", f'elements.kind = "4": expected one of {", ".join(KINDS)}'),
     ('kind = "brouwer"', 'kind = "tle"', "elements.file is missing; it has no default"),
     ('kind = "brouwer"', 'kind = "brouwer"\ntle = 1', "elements.tle = 1: unknown key"),
     ("[elements]", "[element]", "elements is missing; it has no default"),

@@ -12,6 +12,7 @@ from script_modules import load
 
 from acu_daemon.config.acu_tables import AcuSection, AxisSection, ElevationSection
 from acu_daemon.config.antenna_tables import AtmosphereSection, MountSection
+from acu_daemon.config.elements_tables import ElementsSourcesSection
 from acu_daemon.config.envelope_tables import EnvelopeSection, KeepOutSection
 from acu_daemon.config.onboard_tables import (
     AttitudeSection,
@@ -87,6 +88,10 @@ OUT_OF_SAID: dict[str, tuple[type[Section], dict[str, Any]]] = {  # ranges that 
     "MaintenanceSection.from_utc": (MaintenanceSection, {"from_utc": "noon", "to_utc": "2026-01-01T00:00:00Z"}),
     "MaintenanceSection.to_utc": (MaintenanceSection, {"from_utc": "2026-01-01T00:00:00Z", "to_utc": "2026-01-01"}),
     "TrackingSection.low_water_s": (TrackingSection, {"low_water_s": 90.0, "horizon_s": 90.0}),
+    "ElementsSourcesSection.source": (ElementsSourcesSection, {"source": "ftp://example.org/gp"}),
+    "ElementsSourcesSection.store": (ElementsSourcesSection, {"store": ""}),
+    "ElementsSourcesSection.login": (ElementsSourcesSection, {"login": ""}),
+    "ElementsSourcesSection.ca_file": (ElementsSourcesSection, {"ca_file": ""}),
     "SafetySection.register_watchdog_s": (SafetySection, {"register_watchdog_s": 1.9}),
     "SafetySection.following_error_s": (SafetySection, {"following_error_s": 0.4}),
     "AtmosphereSection.pressure_hpa": (

@@ -1,17 +1,21 @@
 """New elements moved into place while the daemon waits are taken before the pass, unless they are worse."""
 
+import json
 import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from evolved_sets import later
 from flights import DEMO_TAI_S
 from waiting import Story, tell
 
 import acu_daemon.cli as cli
 from acu_daemon.acu.commands import Stop
 from acu_daemon.cli.options import coming_pass, load_target
+from acu_daemon.edge.elements_store import record_of
+from acu_daemon.orbit.sgp4_source import Sgp4Propagator
 from acu_daemon.orbit.timescales import tai_from_utc
 
 DEMO = Path(cli.__file__).parent / "demo_config"
@@ -128,3 +132,20 @@ def test_in_mid_pass_nothing_is_taken(config: Path, tmp_path: Path) -> None:
     told = tell(Story(config, RISE_TAI_S + 1.0, 40.0, actions=actions), tmp_path / "state")
     assert len(told.jobs) == 1
     assert told.named("elements.taken") == []
+
+
+@pytest.mark.parametrize("is_right", [True, False], ids=["right", "another orbit's"])
+def test_a_directory_that_others_fill_is_looked_at_while_it_waits(config: Path, tmp_path: Path, is_right: bool) -> None:
+    """The node of this orbit goes a degree a day; a set whose node stood still is 240 km beside it."""
+    station = config / "station.toml"
+    station.write_text(station.read_text() + '\n[elements]\nsource = "given"\n')
+    os.utime(station, (OLD, OLD))
+    (config / "given").mkdir()
+    source = load_target(config, "demo-1", DEMO_TAI_S).elements.propagator
+    assert isinstance(source, Sgp4Propagator)
+    right = json.dumps([record_of(later(LATER_DAYS, source.elements), "test")])
+    given = moves(right if is_right else with_epoch(config, LATER_DAYS), to="given/demo-1.txt")
+    told = tell(Story(config, RISE_TAI_S - 360.0, 25.0, actions=[(5.0, given)]), tmp_path / "state")
+    assert len(told.named("elements.taken")) == is_right
+    assert ["is doubted" in one["reason"] for one in told.named("elements.kept")] == ([] if is_right else [True])
+    assert len(told.jobs) == 1 + is_right

@@ -47,6 +47,14 @@ COMMANDS = {  # name: module of acu_daemon.cli, and the function in it
     "status": ("operator_commands", "status"),
 }
 GROUPS: dict[str, Group] = {
+    "elements": Group(
+        "Where the satellites' elements come from, how fresh they are, and who is asked for newer ones.",
+        {
+            "show": ("elements_commands", "show"),
+            "fetch": ("elements_commands", "fetch"),
+            "resume": ("elements_commands", "resume"),
+        },
+    ),
     "groundtrack": Group(
         "Keep a phased satellite's ground track: simulate it (Galski and Orlando 2011), see it in elements and passes.",
         {

@@ -29,6 +29,7 @@ from acu_daemon.cli.options import (
     parse_utc,
 )
 from acu_daemon.cli.own_daemon import OwnDaemon, find_daemon
+from acu_daemon.config.elements_tables import ElementsSourcesSection
 from acu_daemon.config.load import load_station, satellite_names
 from acu_daemon.config.station_tables import StationFile
 from acu_daemon.config.to_settings import driver_of
@@ -39,6 +40,7 @@ from acu_daemon.daemon.verdict import Level, alarms, verdict
 from acu_daemon.edge.clock import SystemClock, is_clock_synchronised, system_tai_s
 from acu_daemon.edge.clock_sense import before_elements, before_release
 from acu_daemon.edge.earth_orientation_file import at_date
+from acu_daemon.edge.elements_status import standings
 from acu_daemon.edge.event_loop import run_loop
 from acu_daemon.edge.latch import ADVICE, DISARMED, LATCH
 from acu_daemon.edge.leap_seconds_file import leap_seconds_told
@@ -124,11 +126,14 @@ def _findings(config: Path, satellite: str | None, now_tai_s: float, state: Path
         said = "; ".join(text for text in (earth.about, earth.warning) if text)
         yield Finding(WARN if earth.warning else GO, "Earth orientation", said)
     yield from _air(config, station, now_tai_s)
+    yield from sources_findings(config, station.elements, now_tai_s)
+    directory, antenna = state_path(state, is_rehearsal=False), antenna_of(station)
+    folders = (antenna.folder(directory), *older_folders(directory, antenna))
     names = [satellite] if satellite else satellite_names(config)
     if not names:
         yield Finding(NO_GO, "satellites", f"{config}/satellites holds no satellite; put a NAME.toml there")
     for name in names:
-        yield from _satellite(config, name, now_tai_s)
+        yield from _satellite(config, name, now_tai_s, folders)
     try:
         link = make_link(station.acu.url)
         check_rate(link, driver_of(station), station.acu.period_s, station.acu.device_delay_s)
@@ -153,6 +158,12 @@ def _air(config: Path, station: StationFile, now_tai_s: float) -> Iterator[Findi
     reader = WeatherReader(station.atmosphere, station.site.station, config)
     if air := reader.now(now_tai_s).told(station.site.station):
         yield Finding(WARN if reader.problem else GO, "air", "; ".join(one for one in (air, reader.problem) if one))
+
+
+def sources_findings(config: Path, section: ElementsSourcesSection, now_tai_s: float) -> Iterator[Finding]:
+    """How the station's sources of elements stand: never a reason not to track, the elements' own age is."""
+    for one in standings(config, section, now_tai_s):
+        yield Finding(WARN if one.is_problem else GO, "elements source", f"{one.source}: {one.text}")
 
 
 def _held(daemon: OwnDaemon) -> Finding:
@@ -241,10 +252,10 @@ def clock_finding() -> Finding:
     return Finding(WARN, "clock", "not synchronised; start chrony or ntpd: 0.1 s is up to 0.1 deg on a low orbit")
 
 
-def _satellite(config: Path, name: str, now_tai_s: float) -> Iterator[Finding]:
+def _satellite(config: Path, name: str, now_tai_s: float, folders: tuple[Path, ...]) -> Iterator[Finding]:
     try:
-        target = load_target(config, name, now_tai_s, is_strict=False)
-        target = nearest_to_pass(config, name, target, now_tai_s, is_strict=False)
+        target = load_target(config, name, now_tai_s, is_strict=False, folders=folders)
+        target = nearest_to_pass(config, name, target, now_tai_s, is_strict=False, folders=folders)
     except AcuDaemonError as error:
         yield Finding(NO_GO, f"{name}: files", str(error))
         return

@@ -166,6 +166,9 @@ def passes_by_epoch(
             return by_epoch
         from_tai_s = found[count - 1].set_tai_s + 1.0 if count else from_tai_s
         target = load_target(config, name, start_tai_s, is_strict=False, at_tai_s=nearer_tai_s[count])
+        if target.elements.epoch_tai_s <= elements.epoch_tai_s:  # of several sources this is the better one all along
+            by_epoch[-1] = by_epoch[-1][0], by_epoch[-1][1] + found[count:]
+            return by_epoch
 
 
 def _show(

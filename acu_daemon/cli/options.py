@@ -1,6 +1,7 @@
 """Options that several commands share, and what they are turned into."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -9,13 +10,17 @@ from typing import Annotated
 import typer
 
 from acu_daemon import PROCESS_START_S
+from acu_daemon.assist.estimators.estimator import has_covariance
 from acu_daemon.config.load import load_satellite, load_station
 from acu_daemon.config.satellite_tables import SatelliteFile
 from acu_daemon.config.station_tables import StationFile
+from acu_daemon.config.to_settings import estimator_settings
 from acu_daemon.control.tracking.approach import longest_lead_s
+from acu_daemon.edge.carry_over_file import any_carry_over, carry_over_path
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.earth_orientation_file import EarthUsed, at_date
-from acu_daemon.edge.elements_file import LoadedElements, load_elements
+from acu_daemon.edge.elements_choice import ElementsSources, LastFit, choose_elements
+from acu_daemon.edge.elements_file import LoadedElements
 from acu_daemon.edge.recording_whose import ElementsUsed, Whose
 from acu_daemon.edge.state_directory import StateOwner, refuse_world_writable
 from acu_daemon.errors import ElementsError, UsageError
@@ -100,24 +105,39 @@ class Target:
 def whose_recording(target: Target, *, is_rehearsal: bool) -> Whose:
     """Whose the readings of a run are."""
     satellite, elements = target.satellite.satellite, target.elements
-    file = getattr(target.satellite.elements, "file", "")
+    file = getattr(target.satellite.elements, "file", "") or Path(elements.file).name
     used = ElementsUsed(elements.propagator.kind, utc_text(elements.epoch_tai_s), file)
     return Whose(target.station.site.station, satellite.name, satellite.norad_id, used, is_rehearsal)
 
 
 def load_target(
-    config: Path, name: str, now_tai_s: float, *, is_strict: bool = True, at_tai_s: float | None = None
+    config: Path,
+    name: str,
+    now_tai_s: float,
+    *,
+    is_strict: bool = True,
+    at_tai_s: float | None = None,
+    folders: Sequence[Path] = (),
 ) -> Target:
     """Read both files and the elements.  With is_strict, elements that must not be used raise ElementsError.
 
-    at_tai_s: for when elements are wanted, where that is not now.
+    at_tai_s: for when elements are wanted, where that is not now.  folders: of the antenna's state, in which the last
+    pass may have left a fit, which says what the sources of elements are worth.
     """
     for path in (config, config / "satellites", config / "station.toml", config / "satellites" / f"{name}.toml"):
         refuse_world_writable(path)
     base, earth = at_date(load_station(config), config, now_tai_s if at_tai_s is None else at_tai_s)
     satellite, station = load_satellite(config, name, base)
     path = config / "satellites" / f"{name}.toml"
-    elements = load_elements(satellite, path, now_tai_s, station.site.orientation, at_tai_s)
+    elements = choose_elements(
+        satellite,
+        path,
+        now_tai_s,
+        station.site.orientation,
+        at_tai_s,
+        ElementsSources.of(config, base.elements),
+        last_fit(satellite, station, folders),
+    )
     if is_strict and elements.errors:
         raise ElementsError("\n".join(elements.errors))
     if earth.warning:
@@ -125,15 +145,32 @@ def load_target(
     return Target(station, satellite, elements, earth)
 
 
-def nearest_to_pass(config: Path, name: str, target: Target, now_tai_s: float, *, is_strict: bool = True) -> Target:
-    """The target with the set of its file that is nearest to the coming pass, where that is not the nearest to now."""
+def last_fit(satellite: SatelliteFile, station: StationFile, folders: Sequence[Path]) -> LastFit | None:
+    """What the last pass has left in the first of these folders that has anything; None: nothing that can be used."""
+    if not has_covariance(station.tracking.estimator):
+        return None
+    paths = (carry_over_path(one, satellite.satellite.norad_id, satellite.satellite.name) for one in folders)
+    carried = next((found for path in paths if (found := any_carry_over(path)) is not None), None)
+    return None if carried is None else LastFit(carried, station.site, estimator_settings(station, satellite))
+
+
+def nearest_to_pass(
+    config: Path,
+    name: str,
+    target: Target,
+    now_tai_s: float,
+    *,
+    is_strict: bool = True,
+    folders: Sequence[Path] = (),
+) -> Target:
+    """The target with the elements that are the best for the coming pass, where those are not the best for now."""
     if not target.elements.choice or target.elements.errors:
         return target
     found = _passes_until(target, now_tai_s, now_tai_s + NEXT_PASS_DAYS * DAY_S)
     rise_tai_s = next((one.rise_tai_s for one in found if one.set_tai_s > now_tai_s), now_tai_s)
     if rise_tai_s <= now_tai_s:
         return target
-    return load_target(config, name, now_tai_s, is_strict=is_strict, at_tai_s=rise_tai_s)
+    return load_target(config, name, now_tai_s, is_strict=is_strict, at_tai_s=rise_tai_s, folders=folders)
 
 
 def coming_pass(target: Target, now_tai_s: float) -> Pass:

@@ -50,6 +50,8 @@ from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.edge.clock import STEP_S, SystemClock
 from acu_daemon.edge.control_socket import ControlSocket
 from acu_daemon.edge.denied import denied
+from acu_daemon.edge.elements_fetching import ElementsFetching
+from acu_daemon.edge.elements_store import confirm_doubtful
 from acu_daemon.edge.event_loop import loop_runner
 from acu_daemon.edge.fit import ProcessFitRunner
 from acu_daemon.edge.link import Link, check_rate, make_link
@@ -143,19 +145,19 @@ def command(
         )
         if not wait_for_clock(config, satellite, clock, end_s):
             return
-        target = _load(config, satellite, clock)
+        base = state_directory(state, is_rehearsal=clock.is_rehearsal)
+        antenna = antenna_of(load_station(config))
+        directory = antenna_directory(base, antenna)
+        older = () if clock.is_rehearsal else older_folders(base, antenna)  # nothing is carried between rehearsals
+        target = _load(config, satellite, clock, (directory, *older))
         coming_pass(target, clock.tai_s())
         _tell_clock(met if clock.is_rehearsal else met_by_chance(target.station.acu.url, clock), clock)
         link = make_link(target.station.acu.url)
         check_rate(link, driver_of(target.station), target.station.acu.period_s, target.station.acu.device_delay_s)
-        base = state_directory(state, is_rehearsal=clock.is_rehearsal)
-        antenna = antenna_of(target.station)
-        directory = antenna_directory(base, antenna)
         whose = whose_recording(target, is_rehearsal=clock.is_rehearsal)
         recording = None
         if record is not None:
             recording = ends.enter_context(RecordingWriter(record, files, clock.tai_s(), whose))
-        older = () if clock.is_rehearsal else older_folders(base, antenna)  # nothing is carried between rehearsals
         frame = RunSetup(config, satellite, clock, link, directory, files, end_s, shadow, older)
         weather = WeatherWatch(config, target, clock.tai_s())
         first = prepare(frame, weather.on(target))
@@ -178,8 +180,23 @@ def _tell_clock(met: Meeting, clock: SystemClock) -> None:
         log.info("rehearsal.clock", clock=text)
 
 
-def _load(config: Path, name: str, clock: SystemClock) -> Target:
-    return nearest_to_pass(config, name, load_target(config, name, clock.tai_s()), clock.tai_s())
+def _load(config: Path, name: str, clock: SystemClock, folders: tuple[Path, ...]) -> Target:
+    """The elements for the coming pass.  folders: of the antenna's state, in which the last pass's fit is."""
+    target = load_target(config, name, clock.tai_s(), folders=folders)
+    target = nearest_to_pass(config, name, target, clock.tai_s(), folders=folders)
+    if target.elements.confirmed_tai_s is not None:
+        _confirm(config, target, target.elements.confirmed_tai_s)
+    return target
+
+
+def _confirm(config: Path, target: Target, epoch_tai_s: float) -> None:
+    """The last pass has shown that a set is right which the fetcher had kept beside the others."""
+    log: Any = structlog.get_logger("elements")
+    log.info("elements.confirmed", satellite=target.elements.label, epoch=utc_text(epoch_tai_s, 0))
+    norad_id, section = target.satellite.satellite.norad_id, target.station.elements
+    if norad_id is not None:
+        with contextlib.suppress(OSError):  # a store of somebody else's: it is chosen all the same
+            confirm_doubtful(config / section.store, norad_id, epoch_tai_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,6 +215,11 @@ class RunSetup:
     end_s: float
     is_shadow: bool
     older: tuple[Path, ...] = ()
+
+    @property
+    def folders(self) -> tuple[Path, ...]:
+        """The antenna's own folder first."""
+        return (self.directory, *self.older)
 
 
 @dataclass(frozen=True, slots=True)
@@ -273,6 +295,7 @@ def make_job(
         end_tai_s=end_tai_s,
         satellite=target.satellite.satellite.name,
         station=station.station.name,
+        elements=f"{target.elements.propagator.kind} of {utc_text(target.elements.epoch_tai_s, 0)}",
     )
 
 
@@ -316,7 +339,9 @@ async def _run(
     health = Health(notifier)
     snapshot_ticks = SNAPSHOT_TICKS if live is None else 1
     snapshots = SnapshotFile(frame.directory, frame.files, snapshot_ticks)
-    elements = ElementsWatch(frame.config, frame.name, first.target, clock)
+    elements = ElementsWatch(frame.config, frame.name, first.target, clock, frame.folders)
+    section = first.target.station.elements
+    fetching = ElementsFetching(frame.config, section, clock, is_rehearsal=clock.is_rehearsal)
 
     def show(seen: Snapshot) -> None:
         health.see(seen)
@@ -331,6 +356,7 @@ async def _run(
     def why_anew(is_waiting: bool, step_s: float) -> str:
         if step_s:
             return f"the system clock was set by {step_s:+.1f} s, and nothing is tracked"
+        fetching.look()
         if is_waiting and elements.look(now.job.coming):
             return "other elements were taken"
         return "the weather has changed" if is_waiting and weather.look(clock.tai_s()) else ""
@@ -341,7 +367,7 @@ async def _run(
             now.kept.flush()
             if abs(clock.follow()) > STEP_S:
                 clock.obey()
-                elements.target = _load(frame.config, frame.name, clock)
+                elements.target = _load(frame.config, frame.name, clock, frame.folders)
             now = prepare(frame, weather.on(elements.target), memory)
         return Service(
             now.job,
@@ -355,6 +381,7 @@ async def _run(
             on_state=now.kept.see,
             on_end=lambda: notifier("STOPPING=1"),  # no tick feeds the watchdog from here on: it lets the daemon stop
             files_alarm=files_alarm,
+            elements_problem=lambda: fetching.problem,
             why_anew=why_anew,
         )
 
@@ -374,6 +401,7 @@ async def _run(
         return await runs.run()
     finally:
         sync.cancel()
+        await fetching.close()
         now.kept.flush()
         await control.close()
         weather.close()

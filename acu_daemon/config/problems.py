@@ -6,7 +6,7 @@ from datetime import date, time
 from difflib import get_close_matches
 from typing import Any
 
-KINDS = ("tle", "omm", "oem", "cpf", "sp3", "brouwer")
+KINDS = ("tle", "omm", "oem", "cpf", "sp3", "station", "brouwer")
 LONGEST_VALUE = 60
 
 Keys = Mapping[str, Mapping[str, set[str]]]  # of every kind of file, by table; "": the top

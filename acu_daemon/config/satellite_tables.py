@@ -108,6 +108,24 @@ class ElementsFileSection(Section):
     )
 
 
+class StationElementsSection(Section):
+    kind: Literal["station"] = Field(
+        description=(
+            "Elements from the station's [elements] source alone, by norad_id.  Decides that no file is kept for this "
+            "satellite."
+        ),
+    )
+    object: Name | None = Field(
+        default=None,
+        description=(
+            "What an ephemeris there calls this satellite; left out: its name.  Decides which ephemeris is its own."
+        ),
+    )
+    limits: LimitsSection = Field(
+        default=LimitsSection(), description="What the elements must keep to; the defaults suit low orbits."
+    )
+
+
 class BrouwerSection(Section):
     kind: Literal["brouwer"] = Field(
         description="Brouwer mean elements, written here.  Decides how the satellite moves: secular terms of J2 to J4."
@@ -189,8 +207,8 @@ class FallbackSection(Section):
 
 class SatelliteFile(Section):
     satellite: SatelliteSection = Field(description="Which satellite it is.")
-    elements: Annotated[ElementsFileSection | BrouwerSection, Field(discriminator="kind")] = Field(
-        description="Where its orbit comes from; the keys are those of the kind."
+    elements: Annotated[ElementsFileSection | StationElementsSection | BrouwerSection, Field(discriminator="kind")] = (
+        Field(description="Where its orbit comes from; the keys are those of the kind.")
     )
     uncertainty: UncertaintySection = Field(
         default=UncertaintySection(), description="What the elements are worth before the first reading."
@@ -211,3 +229,9 @@ class SatelliteFile(Section):
     tracking: dict[str, Any] = Field(
         default={}, description="Any keys of the station's [tracking], for this satellite alone."
     )
+
+    @model_validator(mode="after")
+    def _has_a_number(self) -> "SatelliteFile":
+        if isinstance(self.elements, StationElementsSection) and self.satellite.norad_id is None:
+            raise ValueError('elements.kind = "station" needs satellite.norad_id: the station\'s sources go by it')
+        return self

@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from acu_daemon.config.acu_tables import AcuSection
 from acu_daemon.config.antenna_tables import AtmosphereSection, MountSection, antenna_of
+from acu_daemon.config.elements_tables import ElementsSourcesSection
 from acu_daemon.config.envelope_tables import EnvelopeSection
 from acu_daemon.config.schedule_tables import ScheduleSection
 from acu_daemon.config.section import Name, Section
@@ -155,6 +156,10 @@ class StationFile(Section):
     receiver: ReceiverSection = Field(default=ReceiverSection(), description="What the antenna receives with.")
     time: TimeSection = Field(
         default=TimeSection(), description="How the Earth is turned; the clock itself is the system's."
+    )
+    elements: ElementsSourcesSection = Field(
+        default=ElementsSourcesSection(),
+        description="Where elements come from besides the satellites' own files (docs/elements.md).",
     )
     readings: ReadingsSection = Field(default=ReadingsSection(), description="What the ACU's angles are worth.")
     tracking: TrackingSection = Field(

@@ -20,6 +20,7 @@ def status_lines(seen: Snapshot) -> list[str]:
         ("time", seen.utc),
         ("satellite", f"{seen.satellite}, over {seen.station}" if seen.station else seen.satellite),
         ("pass", _pass(seen)),
+        ("elements", "; ".join(text for text in (seen.elements, seen.elements_problem) if text)),
         ("antenna", _antenna(seen)),
         ("path", _path(seen)),
         ("signal", _signal(seen)),

@@ -52,6 +52,7 @@ class PassJob:
     state: ControlState = ControlState()  # what the decision begins with: what the last run left
     satellite: str = ""  # names for people
     station: str = ""
+    elements: str = ""  # kind and epoch, for people
     is_anew: bool = False  # not the first run of this daemon: the ACU was there
 
 
@@ -95,6 +96,7 @@ class Service:
         on_fit: Callable[[FitResult], None] | None = None,
         on_state: Callable[[ControlState], None] | None = None,
         files_alarm: Callable[[], str] = str,
+        elements_problem: Callable[[], str] = str,
         on_end: Callable[[], None] | None = None,
         why_anew: Callable[[bool, float], str] | None = None,
     ) -> None:
@@ -112,6 +114,7 @@ class Service:
         self._on_state = on_state
         self._on_end = on_end
         self._files_alarm = files_alarm
+        self._elements_problem = elements_problem
         self._why_anew = why_anew
         self.anew_reason = ""  # why the run has ended: another is to follow at once
         self._is_over = asyncio.Event()
@@ -294,7 +297,14 @@ class Service:
             self._port,
             self._job.control,
             self._clock.tai_s(),
-            Subject(self._job.satellite, self._job.station, self._acu, self._job.coming),
+            Subject(
+                self._job.satellite,
+                self._job.station,
+                self._acu,
+                self._job.coming,
+                self._job.elements,
+                self._elements_problem(),
+            ),
             is_rehearsal=self._job.is_rehearsal,
             files_alarm=self._files_alarm(),
         )

@@ -18,6 +18,8 @@ class Subject:
     station: str = ""
     acu: str = ""
     coming: Pass | None = None
+    elements: str = ""
+    elements_problem: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +77,8 @@ class Snapshot:
     satellite: str = ""
     station: str = ""
     acu: str = ""
+    elements: str = ""  # kind and epoch of what the satellite is tracked by
+    elements_problem: str = ""  # why no newer ones come
     verdict: str = ""  # daemon.verdict
     state_s: float | None = None  # since the state began
     off_path_deg: float | None = None  # where the antenna points beside the path (control.tracking.off_path)

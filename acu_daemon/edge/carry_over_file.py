@@ -45,6 +45,16 @@ def read_carry_over(path: Path, satellite: str) -> CarryOver | None:
         return None
 
 
+def any_carry_over(path: Path) -> CarryOver | None:
+    """The same, whatever the satellite is called in it; None where it cannot be used, and nothing is said of that."""
+    try:
+        with path.open("rb") as file:
+            read = json.loads(file.read(_LARGEST_BYTES))
+        return from_json(read, str(read["satellite"]))
+    except (OSError, ValueError, TypeError, KeyError, OverflowError, RecursionError):
+        return None
+
+
 def write_carry_over(path: Path, satellite: str, carried: CarryOver) -> None:
     """Put the file in place, whole.  OSError: it cannot be."""
     replace_file(path, json.dumps(to_json(satellite, carried), indent=1, allow_nan=False).encode("ascii"))

@@ -2,16 +2,25 @@
 
 import time
 from dataclasses import dataclass, replace
+from math import inf
 from pathlib import Path
+from typing import Literal
 
-from acu_daemon.config.satellite_tables import BrouwerSection, ElementsFileSection, SatelliteFile
-from acu_daemon.edge.orbit_file import EPHEMERIS_PARSERS, SET_PARSERS, EphemerisParser, SetParser, read_orbit_file
+from acu_daemon.config.satellite_tables import (
+    BrouwerSection,
+    ElementsFileSection,
+    SatelliteFile,
+    StationElementsSection,
+)
+from acu_daemon.edge.orbit_file import EPHEMERIS_PARSERS, SET_PARSERS, EphemerisParser, read_orbit_file
 from acu_daemon.errors import ElementsError
 from acu_daemon.model import EarthOrientation
 from acu_daemon.orbit.brouwer import BrouwerElements, BrouwerPropagator
+from acu_daemon.orbit.contents import FileKind
 from acu_daemon.orbit.element_set import Problem
 from acu_daemon.orbit.elements import check_brouwer, check_elements, check_ephemeris
 from acu_daemon.orbit.ephemeris import Ephemeris, EphemerisPropagator
+from acu_daemon.orbit.named_sets import named_sets
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.orbit.selection import is_of, select_elements, select_segments
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator
@@ -34,6 +43,9 @@ class LoadedElements:
     warnings: list[str]
     choice: str = ""  # which of several sets is used, and why
     epochs_tai_s: tuple[float, ...] = ()  # of all the satellite's sets in the file
+    file: str = ""  # where it was read
+    expected_m: float = inf  # how far off along the track it is expected to be, where sources were compared
+    confirmed_tai_s: float | None = None  # epoch of a set that was doubtful, and that the last pass bears out
 
 
 def load_elements(
@@ -67,7 +79,7 @@ def load_elements(
 def _is_recent(satellite: SatelliteFile, toml_path: Path) -> bool:
     """Whether the file has changed just now, or was taken away from its directory just now."""
     section = satellite.elements
-    if isinstance(section, BrouwerSection):
+    if not isinstance(section, ElementsFileSection):
         return False
     path = toml_path.parent / section.file
     try:
@@ -82,20 +94,42 @@ def _load(
     section = satellite.elements
     if isinstance(section, BrouwerSection):
         return _from_brouwer(satellite, section, toml_path, now_tai_s)
+    if isinstance(section, StationElementsSection):
+        raise ElementsError(f'{toml_path}: elements.kind = "station", but station.toml has no [elements] source')
     path = toml_path.parent / section.file
     try:
         kind, text = read_orbit_file(path)
     except OSError as error:
         raise ElementsError(f"{toml_path}: elements.file = {section.file!r}: {path}: {error.strerror}") from None
-    loaded = (
-        _from_ephemeris(satellite, section, path, text, now_tai_s, orientation, EPHEMERIS_PARSERS[kind])
-        if kind in EPHEMERIS_PARSERS
-        else _from_sets(satellite, section, path, text, now_tai_s, at_tai_s, SET_PARSERS[kind])
-    )
+    loaded = load_text(satellite, section, path, kind, text, now_tai_s, orientation, at_tai_s)
     if kind == section.kind:
         return loaded
     said = f'{toml_path}: elements.kind = "{section.kind}", but {path} is of kind "{kind}" and read as that'
     return replace(loaded, warnings=[said, *loaded.warnings])
+
+
+def load_text(
+    satellite: SatelliteFile,
+    section: ElementsFileSection | StationElementsSection,
+    path: Path,
+    kind: FileKind,
+    text: str,
+    now_tai_s: float,
+    orientation: EarthOrientation,
+    at_tai_s: float,
+    *,
+    must_match: bool = False,
+) -> LoadedElements:
+    """Make the satellite's propagator of a file's text.  ElementsError: names file, line and reason.
+
+    must_match: nobody has said that the file is this satellite's: an ephemeris must bear its name or number.
+    """
+    loaded = (
+        _from_ephemeris(satellite, section, path, text, now_tai_s, orientation, EPHEMERIS_PARSERS[kind], must_match)
+        if kind != "tle" and kind != "omm"
+        else _from_sets(satellite, section, path, text, now_tai_s, at_tai_s, kind)
+    )
+    return replace(loaded, file=str(path))
 
 
 def _from_brouwer(
@@ -118,15 +152,17 @@ def _from_brouwer(
 
 def _from_sets(
     satellite: SatelliteFile,
-    section: ElementsFileSection,
+    section: ElementsFileSection | StationElementsSection,
     path: Path,
     text: str,
     now_tai_s: float,
     at_tai_s: float,
-    parse: SetParser,
+    kind: Literal["tle", "omm"],
 ) -> LoadedElements:
-    sets, problems = parse(text, str(path))
     wanted = satellite.satellite
+    sets, problems = named_sets(kind, text, str(path), wanted.norad_id) if wanted.norad_id else ([], [])
+    if not sets:
+        sets, problems = SET_PARSERS[kind](text, str(path))
     lost = [one for one in problems if one.kind == "lost"]
     own = [one for one in problems if one.kind != "note" and is_of(one, wanted.norad_id, wanted.name)]
     if not sets:
@@ -156,12 +192,13 @@ def _others(problems: list[Problem], own: list[Problem]) -> list[Problem]:
 
 def _from_ephemeris(
     satellite: SatelliteFile,
-    section: ElementsFileSection,
+    section: ElementsFileSection | StationElementsSection,
     path: Path,
     text: str,
     now_tai_s: float,
     orientation: EarthOrientation,
     parse: EphemerisParser,
+    must_match: bool,
 ) -> LoadedElements:
     segments, problems = parse(text, str(path))
     if not segments:
@@ -169,7 +206,7 @@ def _from_ephemeris(
     wanted = satellite.satellite
     try:
         segments, doubts = select_segments(
-            segments, wanted.norad_id, section.object or wanted.name, is_whole=not problems
+            segments, wanted.norad_id, section.object or wanted.name, is_whole=not problems and not must_match
         )
     except ElementsError as error:
         raise ElementsError("\n".join([str(error), *_few(problems, "segments")])) from None

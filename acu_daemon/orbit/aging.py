@@ -14,6 +14,7 @@ from acu_daemon.units import DAY_S, DEG, EARTH_EQUATORIAL_RADIUS_M, MU_M3_S2
 DRAG_SHARE = 0.5  # of the drag, unknown in advance: 34 km after five days on the ISS (docs/decisions/0023)
 FRESH_M, FRESH_M_D = 1e3, 0.5e3  # of fresh elements, and what they lose in a day without drag
 _BROUWER_M_D2, _AT_M, _SCALE_M = 22e3, 420e3, 85e3  # no drag at all: its whole, docs/decisions/0015, by height
+PREDICTED_SHARE, DETERMINED_M, PREDICTED_M_D = 0.15, 10.0, 50.0
 _LOST_SHARE = 0.25  # of a revolution
 
 
@@ -56,8 +57,20 @@ def expected_error(elements: ElementSet | BrouwerElements, at_tai_s: float) -> E
     return ExpectedError(float(np.linalg.norm(r2_m - r1_m)) + FRESH_M + FRESH_M_D * days, a_m)
 
 
+def predicted_error(a_m: float, since_s: float) -> ExpectedError:
+    """The error of an ephemeris so long after what it was determined from; before that it is the determination's.
+
+    A share of the drag stays unknown to whoever predicts (docs/decisions/0024), the rest is small.
+    """
+    days = max(since_s, 0.0) / DAY_S
+    return ExpectedError(PREDICTED_SHARE * _drag_m_d2(a_m) * days**2 + DETERMINED_M + PREDICTED_M_D * days, a_m)
+
+
+def _drag_m_d2(a_m: float) -> float:
+    """What drag moves a satellite along its track, in the square of days."""
+    return _BROUWER_M_D2 * exp(-(a_m - EARTH_EQUATORIAL_RADIUS_M - _AT_M) / _SCALE_M)
+
+
 def _of_brouwer(elements: BrouwerElements, at_tai_s: float) -> ExpectedError:
     days = abs(at_tai_s - elements.epoch_tai_s) / DAY_S
-    height_m = elements.a_m - EARTH_EQUATORIAL_RADIUS_M
-    growth_m_d2 = _BROUWER_M_D2 * exp(-(height_m - _AT_M) / _SCALE_M)
-    return ExpectedError(growth_m_d2 * days**2 + FRESH_M + FRESH_M_D * days, elements.a_m)
+    return ExpectedError(_drag_m_d2(elements.a_m) * days**2 + FRESH_M + FRESH_M_D * days, elements.a_m)

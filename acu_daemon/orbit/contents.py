@@ -18,6 +18,9 @@ _UTF_16 = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
 _TLE = re.compile(r"^[ \t\xa0]*[12][ \t\xa0][ 0-9A-Za-z][ 0-9]{3}[0-9]", re.MULTILINE)
 _CPF = re.compile(r"\A(\s*00.*\n)*\s*H1\s+CPF\b", re.IGNORECASE)
 _SP3 = re.compile(r"\A\s*#[a-d][PV]\d{4} ", re.IGNORECASE)
+_LISTED_OMM = re.compile(
+    r"\s*([\[{][\[{\s]*\"[^<]*\"(NORAD_CAT_ID|MEAN_MOTION)\"|[\w,]*,NORAD_CAT_ID\b)", re.IGNORECASE
+)
 _OMM = re.compile(r"CCSDS_OMM_VERS|MEAN_MOTION|<omm\b|NORAD_CAT_ID", re.IGNORECASE)
 _OEM = re.compile(r"CCSDS_OEM_VERS|META_START|<oem\b|<stateVector", re.IGNORECASE)
 _PAGE = re.compile(r"<!doctype\s+html|<html\b|<head>|<title\b", re.IGNORECASE)  # <body> is also of CCSDS messages
@@ -45,6 +48,8 @@ def kind_of(text: str) -> FileKind | None:
         return "cpf"
     if _SP3.match(text):
         return "sp3"
+    if _LISTED_OMM.match(text[:2000]):
+        return "omm"  # by its begin: a catalogue has 8 million characters
     if _TLE.search(text):
         return "tle"
     if _PAGE.search(text[:2000]):

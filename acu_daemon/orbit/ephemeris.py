@@ -52,6 +52,11 @@ class Ephemeris:
         self.epoch_tai_s = _last_determined(self.spans_tai_s, segments[-1].created_tai_s)
 
     @property
+    def semi_major_axis_m(self) -> float:
+        """Of the average mean motion."""
+        return float((MU_M3_S2 / self.mean_motion_rad_s**2) ** (1.0 / 3.0))
+
+    @property
     def coverage(self) -> str:
         """The spans as a text."""
         return " and ".join(f"{utc_text(start, 0)} to {utc_text(end, 0)}" for start, end in self.spans_tai_s)
@@ -121,7 +126,7 @@ class EphemerisPropagator:
         within_s = np.clip(shifted_s, start, end)
         try:
             elements = osculating_from_state(*self.ephemeris.states(within_s))
-            return state_from_elements(_changed(elements, given, shifted_s - within_s))
+            return state_from_elements(moved_elements(elements, given, shifted_s - within_s))
         except ValueError as error:
             raise OrbitError(f"{self.ephemeris.label}: the corrected orbit is no ellipse: {error}") from None
 
@@ -130,7 +135,7 @@ class EphemerisPropagator:
         return EphemerisPropagator(self.ephemeris, correction)
 
 
-def _changed(elements: OsculatingElements, correction: Correction, beyond_s: Array) -> OsculatingElements:
+def moved_elements(elements: OsculatingElements, correction: Correction, beyond_s: Array) -> OsculatingElements:
     """Add the corrections but the mean anomaly's, and go on by two-body motion for `beyond_s` (N,)."""
     mean_motion = np.sqrt(MU_M3_S2 / elements.a_m**3)
     changed_mean_motion = mean_motion + correction.delta_mean_motion_rad_s

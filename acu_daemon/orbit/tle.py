@@ -24,7 +24,7 @@ _EXPONENT = re.compile(r"([+-]?) *(\d{1,6})([+ -]\d)", re.ASCII)
 _NUMBERED = re.compile(r"[12] [ 0-9A-Za-z][ 0-9]{3}[0-9]([A-Za-z ]?$|[A-Za-z ] )", re.ASCII)
 _WHOLE_FROM = 40  # a longer line is no name
 _LEAST_DIGITS = 20  # of a whole line: a template of the format has fewer
-_ALPHA_5 = "ABCDEFGHJKLMNPQRSTUVWXYZ"
+ALPHA_5 = "ABCDEFGHJKLMNPQRSTUVWXYZ"
 _SGP4_XP = "4"
 _VALUES = bytes(c - 48 if 48 <= c <= 57 else c == 45 for c in range(256))  # of a character, for the checksum
 _TYPED = str.maketrans(
@@ -217,8 +217,8 @@ def catalogue_number(text: str) -> int | None:
     """Read a NORAD number: digits, or Alpha-5 (a letter but I and O, then four digits); None if it is neither."""
     if text.isascii() and text.isdigit() and len(text) <= 9:
         return int(text)
-    if len(text) == 5 and text[0] in _ALPHA_5 and text[1:].isascii() and text[1:].isdigit():
-        return (_ALPHA_5.index(text[0]) + 10) * 10000 + int(text[1:])
+    if len(text) == 5 and text[0] in ALPHA_5 and text[1:].isascii() and text[1:].isdigit():
+        return (ALPHA_5.index(text[0]) + 10) * 10000 + int(text[1:])
     return None
 
 
