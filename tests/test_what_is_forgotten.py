@@ -330,3 +330,30 @@ def test_an_occasion_makes_the_memory_forget_what_belongs_to_it_and_nothing_else
         if after[one] != expected[one] and (one not in TOUCHED or one in forgets or one in occasion.changes)
     }
     assert unlike == {}
+
+
+def test_all_that_is_remembered_in_continuous_azimuth_goes_to_the_turn_that_a_limit_switch_shows() -> None:
+    """The fifth reading in a row at the counter-clockwise end, where 91 deg was counted."""
+    before = remembering(
+        full(TrackState.HOLD_FITTED, HOLDING),
+        az_deg=91.0,
+        turn=TurnWatch(against_count=4, learned_count=1),
+        axis_az=AxisState(91.0, 0.0),
+        commands=(Sent(91.0, EL_DEG, is_free=True),) * 3,
+        in_force=(NOW - 0.3, 91.0, EL_DEG),
+        track_of_readings=tuple((NOW - 0.19 - 0.1 * k, 91.0, EL_DEG) for k in range(5, -1, -1)),
+    )
+    seen = replace(HOLDING, az_deg=91.0, is_at_ccw_limit=True)
+    after, _ = tick(before, TickInput(saw(seen), FITTED, NOW), CONFIG)
+    assert after.intake.az_deg == -269.0
+    assert {az_deg for _, az_deg, _ in after.intake.track_of_readings} == {-269.0}
+    assert after.registers.in_force == (NOW - 0.09, -269.0, EL_DEG)
+    assert after.registers.axis_az is not None
+    assert after.registers.axis_az.position_deg == pytest.approx(-269.0, abs=1.0)
+    assert len(after.registers.commands) == 1  # a lag over two turns is none
+    assert after.lag == before.lag
+    assert after.turn.learned_count == 2
+    assert after.latch.axes == AxesWatch() or after.latch.axes.az.mark_deg == -269.0
+    unwritten = remembering(before, axis_az=None, in_force=None, commands=(None,) * 3)
+    after, _ = tick(unwritten, TickInput(saw(seen), FITTED, NOW), CONFIG)
+    assert (after.intake.az_deg, after.registers.in_force) == (-269.0, None)
