@@ -10,6 +10,7 @@ from acu_daemon.config.elements_tables import ElementsSourcesSection
 from acu_daemon.config.envelope_tables import EnvelopeSection
 from acu_daemon.config.schedule_tables import ScheduleSection
 from acu_daemon.config.section import Name, Section
+from acu_daemon.config.station_day_tables import HooksSection, WindSection
 from acu_daemon.config.tracking_tables import ReadingsSection, ReceiverSection, TrackingSection
 from acu_daemon.model import EarthOrientation, Site, Station
 from acu_daemon.pointing.envelope import Envelope
@@ -186,6 +187,11 @@ class StationFile(Section):
     schedule: ScheduleSection = Field(
         default=ScheduleSection(), description="Which passes a station tracks by itself, and what it does between them."
     )
+
+    hooks: HooksSection = Field(
+        default=HooksSection(), description="Programs that are started at what happens in a pass (docs/schedule.md)."
+    )
+    wind: WindSection = Field(default=WindSection(), description="When the wind stows the antenna (docs/schedule.md).")
 
     @model_validator(mode="after")
     def _is_some_air(self) -> "StationFile":
