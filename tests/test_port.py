@@ -130,6 +130,23 @@ def test_p2_a_silent_link_is_dropped_and_opened_again() -> None:
     play(story)
 
 
+def test_p2_the_silence_counts_from_the_command_that_went_unanswered_and_none_that_was_not_sent() -> None:
+    async def story(port: AcuPort, link: MemoryLink, _clock: LoopClock) -> None:
+        await port.exchange(Poll())
+        await asyncio.sleep(30.0)
+        assert port.silence_s == 0.0
+        link.is_cut = True
+        await port.exchange(Poll())
+        await asyncio.sleep(0.3)
+        assert port.silence_s == pytest.approx(SA3842.reply_deadline_s + 0.3 + 0.1, abs=1e-6)
+        link.is_cut = False
+        await asyncio.sleep(0.3)
+        await port.exchange(Poll())
+        assert port.silence_s == 0.0
+
+    play(story)
+
+
 def test_a_connection_that_was_lost_is_closed_before_the_next_one_is_opened() -> None:
     """An ACU with one client at a time would refuse the next one, and what is unsent would still go out."""
 
@@ -147,8 +164,11 @@ def test_a_connection_that_was_lost_is_closed_before_the_next_one_is_opened() ->
 
         link.open, link.close = noted_open, noted_close
         for _ in range(3):
-            await asyncio.sleep(1.0)
+            link.is_cut = True
+            await port.exchange(Poll())
+            await asyncio.sleep(0.5)
             port.drop_if_silent()
+            link.is_cut = False
             await asyncio.sleep(0.2)
             await port.wait_until_up()
         assert done == ["close", "open"] * 3

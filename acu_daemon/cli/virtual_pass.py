@@ -93,6 +93,7 @@ def fly(
     seed: int = 1,
     byte_time_s: float = 0.0,
     is_shadow: bool = False,
+    is_resting: bool = False,
     script: Sequence[tuple[float, Action]] = (),
     make_acu: Callable[[AcuParts], FakeAcu] = FakeAcu,
     make_clock: Callable[[float], LoopClock] = LoopClock,
@@ -133,7 +134,7 @@ def fly(
         for fault in scenario.faults:
             board.add(fault)
         job = make_job(target, coming_pass(target, begin_tai_s), link, is_rehearsal=True, end_tai_s=end_tai_s)
-        job = replace(job, control=replace(job.control, is_shadow=is_shadow))
+        job = replace(job, control=replace(job.control, is_shadow=is_shadow, is_resting=is_resting))
         service = Service(job, link, clock, make_runner(job.refit), on_snapshot=flight.snapshots.append)
         loop = asyncio.get_running_loop()
         for tai_s, action in script:

@@ -32,6 +32,7 @@ class ControlConfig:
     zenith_takeover: ZenithTakeover = "fitted"
     is_armed: bool = True  # at the start; later as people arm and disarm
     is_shadow: bool = False  # commands nothing, whatever happens
+    is_resting: bool = False  # between passes: polls, and commands nothing
     is_rehearsal: bool = False  # commands nothing but an ACU that says it is simulated
     register_watchdog_s: float = 0.0  # what the ACU's is set to; 0: it is not touched
     following: Bounds = Bounds()

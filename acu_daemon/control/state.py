@@ -253,6 +253,10 @@ class ControlState:
 
     def is_armed(self, config: ControlConfig) -> bool:
         """Whether anything may be written to the ACU."""
+        return self.is_armed_by_people(config) and not config.is_resting
+
+    def is_armed_by_people(self, config: ControlConfig) -> bool:
+        """Whether people let the daemon command, now or, where it rests, in the next pass."""
         armed = config.is_armed if self.arming.by_people is None else self.arming.by_people
         return armed and not config.is_shadow
 

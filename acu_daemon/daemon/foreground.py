@@ -23,6 +23,7 @@ from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.hear import hear
 from acu_daemon.control.orders import Event
 from acu_daemon.control.safety.arming import owes_stop
+from acu_daemon.control.safety.interlock import question
 from acu_daemon.control.state import StartStage, Watchdog
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Arrival, Observation, Request, TickInput
@@ -40,6 +41,9 @@ DOUBT_EVERY_S = 1.0
 LATE_SHARE = 0.5  # of the period: after a tick that began later than this the next one is skipped
 FIRST_SHARE = 0.2  # of the period, at least, before the first tick
 HURRY_SHARE = 0.9  # of the period: the next tick comes on time
+LOOK_TICKS = 10  # from look to look at clock and line
+REST_S = 1.0  # from poll to poll between passes
+AWAKE_S = 2.0  # after a person's word or a reply that did not come it polls as in a pass for so long
 BLIND_S = 1.0  # without a status other replies keep the link no longer than this: they say nothing of the antenna
 
 
@@ -66,6 +70,7 @@ class Foreground:
         self._seen = Observation()
         self._requests: tuple[Request, ...] = ()
         self._connect_count = 0
+        self._awake_until_s = -math.inf
         self._status_s = -math.inf  # when the newest status came, believed or not, or was refused
         self._log: Any = structlog.get_logger("tick")
         self.identity: AcuIdentity | None = None
@@ -83,6 +88,7 @@ class Foreground:
         """Tick at the tenths of UTC seconds; a late tick is counted and skipped, never sent in a burst."""
         period_s, log = self._config.period_s, self._log.bind()
         due_tai_s = math.ceil(self._clock.tai_s() / period_s + FIRST_SHARE) * period_s
+        ticks = 1
         while True:
             await self._clock.sleep_until(due_tai_s)
             late_s = self._clock.tai_s() - due_tai_s
@@ -90,7 +96,7 @@ class Foreground:
             self.tick_count += 1
             await self._tick()
             await self._hurry(due_tai_s)
-            if self.tick_count % 10 == 0:
+            if ticks >= LOOK_TICKS or self.tick_count % LOOK_TICKS == 0:
                 self.clock_watch.look(self._area.sky.prediction)
                 self.line_watch.look()
             self._after_tick()
@@ -98,8 +104,19 @@ class Foreground:
             if round(late_s, 3) > (missed + LATE_SHARE) * period_s:
                 missed += 1  # two writes that near to each other would be a burst
             self.skipped_tick_count += missed
-            due_tai_s = round(due_tai_s / period_s + 1 + missed) * period_s
+            ticks = max(1 + missed, round(REST_S / period_s)) if self._may_rest() else 1 + missed
+            due_tai_s = round(due_tai_s / period_s + ticks) * period_s
             log.debug("tick", late_ms=1e3 * late_s, skipped=missed, status=self._area.state.intake.status)
+
+    def _may_rest(self) -> bool:
+        """Whether there is nothing to do but to see, once in a while, that the antenna still stands."""
+        state, now_s = self._area.state, self._clock.monotonic_s()
+        if not self._config.is_resting:
+            return False
+        is_known = self._seen.status is not None and state.startup.stage >= StartStage.REGISTERS_KNOWN
+        if not is_known or self._requests or state.arming.is_stop_due or question(state) is not None:
+            self._awake_until_s = now_s + AWAKE_S
+        return now_s >= self._awake_until_s
 
     async def _hurry(self, due_tai_s: float) -> None:
         """While the start's exchanges are answered, the next one follows in the same tick if it fits."""
@@ -165,7 +182,8 @@ class Foreground:
         """On another connection, however soon it came, everything is read again before it is commanded."""
         before, self._connect_count = self._connect_count, self._port.connect_count
         is_another = before != self._connect_count and self._area.state.startup.stage is not StartStage.NEW
-        is_blind = self._clock.monotonic_s() - self._status_s > BLIND_S
+        rest_s = REST_S if self._config.is_resting else 0.0
+        is_blind = self._clock.monotonic_s() - self._status_s > BLIND_S + rest_s
         return self._port.silence_s if self._port.is_up and not is_another and not is_blind else math.inf
 
     async def _do(self, command: Command) -> bool:

@@ -58,6 +58,7 @@ class AcuPort:
         self._broken = ""  # why the present connection is
         self.problem = ""
         self.last_reply_s = clock.monotonic_s()
+        self._unanswered_s: float | None = None  # start of the first exchange since then that brought no reply
         self.connect_count = 0
         self.attempt_count = 0  # to open the link, begun or failed
         self.failed_exchange_count = 0
@@ -75,8 +76,10 @@ class AcuPort:
 
     @property
     def silence_s(self) -> float:
-        """Seconds since the last valid reply."""
-        return self._clock.monotonic_s() - self.last_reply_s
+        """Seconds since the last valid reply; counted from the command that went unanswered where few are sent."""
+        if self._unanswered_s is None:
+            return 0.0
+        return self._clock.monotonic_s() - max(self.last_reply_s, self._unanswered_s - self._period_s)
 
     @property
     def discarded_count(self) -> int:
@@ -130,10 +133,13 @@ class AcuPort:
         if reply is None:
             self._driver.fail(self._clock.monotonic_s())
             self.failed_exchange_count += 1
+            self._unanswered_s = started_s if self._unanswered_s is None else self._unanswered_s
             return Answer(None, started_tai_s, None)
         ended_s = self._clock.monotonic_s()
         if not isinstance(reply, AcuIdentity) or reply.is_known:  # an identity is free text: another may be garble
-            self.last_reply_s = ended_s
+            self.last_reply_s, self._unanswered_s = ended_s, None
+        elif self._unanswered_s is None:
+            self._unanswered_s = started_s
         self._latencies_s[self._latency_count % LATENCY_COUNT] = max(0.0, ended_s - started_s - wire_s)
         self._latency_count += 1
         first_byte_tai_s = None if first_byte_s is None else started_tai_s + first_byte_s - started_s

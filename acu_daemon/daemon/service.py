@@ -182,10 +182,9 @@ class Service:
     async def _track(self) -> str:
         self._started_tai_s = self._clock.tai_s()
         async with asyncio.TaskGroup() as inner:
-            tasks = [
-                inner.create_task(self._foreground.run(), name="foreground"),
-                inner.create_task(self._background.run(), name="background"),
-            ]
+            tasks = [inner.create_task(self._foreground.run(), name="foreground")]
+            if not self._job.control.is_resting:
+                tasks.append(inner.create_task(self._background.run(), name="background"))
             await self._is_over.wait()
             for task in tasks:
                 task.cancel()
@@ -200,9 +199,10 @@ class Service:
             self._is_over.set()
             return
         self._check_acu(now_tai_s - self._started_tai_s)
-        if is_due(sky.plan, self._area.state):
+        is_resting = self._job.control.is_resting
+        if not is_resting and is_due(sky.plan, self._area.state):
             self._plan(now_tai_s)
-        if self._why_anew is not None and self._foreground.tick_count % LOOK_TICKS == 0:
+        if self._why_anew is not None and (is_resting or self._foreground.tick_count % LOOK_TICKS == 0):
             self._look_anew(self._why_anew, now_tai_s)
 
     def _look_anew(self, why_anew: Callable[[bool, float], str], now_tai_s: float) -> None:

@@ -143,7 +143,7 @@ def _seen(
 def _arming(state: ControlState, control: ControlConfig) -> str:
     if control.is_shadow:
         return "shadow"
-    return "armed" if state.is_armed(control) else "disarmed"
+    return "armed" if state.is_armed_by_people(control) else "disarmed"
 
 
 def _miss_deg(reading: Reading | None, prediction: Prediction | None) -> float | None:

@@ -57,9 +57,13 @@ def last_command(state: ControlState, config: ControlConfig) -> Command | None:
 
 
 def begin_run(state: ControlState, config: ControlConfig) -> ControlState:
-    """Of the STOP that was left owing: it is owed still by a daemon that is armed, or held the antenna."""
-    is_ours = state.is_armed(config) or state.foreign_stop.held is not None
-    return owe_stop(state, is_due=state.arming.is_stop_due and is_ours and not config.is_shadow)
+    """Of the STOP that was left owing: it is owed still by a daemon that is armed, or held the antenna.
+
+    A daemon that rests owes one where it was killed while it held the antenna.
+    """
+    is_held = state.foreign_stop.held is not None
+    is_owed = (state.arming.is_stop_due and (state.is_armed(config) or is_held)) or (config.is_resting and is_held)
+    return owe_stop(state, is_due=is_owed and not config.is_shadow)
 
 
 def owes_stop(state: ControlState, config: ControlConfig, *, has_written: bool) -> bool:

@@ -56,7 +56,7 @@ def refusal(command: Command, state: ControlState, now_tai_s: float, config: Con
     if state.latch.problem:
         return f"latched: {state.latch.problem}"
     if not state.is_armed(config):
-        return "disarmed"
+        return "resting between passes" if config.is_resting else "disarmed"
     if state.intake.status is None or not state.intake.status.is_remote_enabled:
         return "the local panel has control"
     return _of_kind(command, state, now_tai_s, config)

@@ -39,11 +39,11 @@ def obey(state: ControlState, requests: Iterable[Request], config: ControlConfig
             state = owe_stop(clear_latch(anew(state)), is_due=is_stop_due and not state.is_armed(config))
         elif request is Request.ARM and not config.is_shadow:
             state = forget_held(state)  # whoever says so has seen how the antenna stands
-            if not state.is_armed(config):
+            if not state.is_armed_by_people(config):
                 events.append(Event("armed"))
                 is_stop_due = is_stop_due and bool(state.latch.problem)
                 state = forget_faults(set_armed(anew(state), is_stop_due=is_stop_due))
-        elif request is Request.DISARM and state.is_armed(config):
+        elif request is Request.DISARM and state.is_armed_by_people(config):
             is_ours = state.registers.in_force is not None or state.foreign_stop.held is not None  # of one killed
             state = owe_stop(disarm(state, "a person", events), is_due=is_stop_due or is_ours)
     return state

@@ -15,7 +15,7 @@ def watch_interlock(state: ControlState, seen: Observation, config: ControlConfi
     if not isinstance(faults, FaultReport) or state.intake.status is None:
         return state if state.tracking.track is TrackState.FAULT else forget_faults(state), ""
     state = with_parts(state, interlock=Interlock(_faults(state.intake.status)))
-    if not (faults.is_emergency_stop or faults.is_door_open) or not state.is_armed(config):
+    if not (faults.is_emergency_stop or faults.is_door_open) or not state.is_armed_by_people(config):
         return state, ""
     return state, "the emergency stop" if faults.is_emergency_stop else "an open door"
 
