@@ -1,6 +1,7 @@
 """The sun on a pass: told before it, avoided or followed as the policy says, and an antenna that may not be moved."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -151,3 +152,17 @@ def test_the_way_out_is_clear_of_the_sun_for_long_and_within_the_limits() -> Non
     shut = replace(config.envelope, elevation=AxisLimits(place[1] - 1.0, place[1] + 1.0, 5.0, 5.0))
     shut = replace(shut, azimuth=AxisLimits(place[0] - 1.0, place[0] + 1.0, 5.0, 5.0))
     assert way_out(shut, place, STANDS_TAI_S) is None
+
+
+def test_an_antenna_that_is_found_inside_the_sun_is_led_out_and_to_the_path() -> None:
+    chosen, begin_tai_s = target("avoid"), BEGIN_TAI_S - 60.0
+    assert chosen.station.bounds.sun is not None
+    az_deg, el_deg = chosen.station.bounds.sun.direction_deg(begin_tai_s)
+    flight = flight_of(chosen, begin_tai_s, 25.0, antenna=AcuChoice(azimuth_deg=az_deg + 1.0, elevation_deg=el_deg))
+    angles = from_the_sun_deg(flight)
+    out = next(k for k, angle_deg in enumerate(angles) if angle_deg > RADIUS_DEG)
+    assert angles[0] < 1.0
+    assert all(b > a - 0.05 for a, b in pairwise(angles[: out + 1]))
+    assert min(angles[out:]) > RADIUS_DEG
+    assert not events_named(flight, "fence.refused")
+    assert flight.states()[-1].startswith("AUTOTRACK")

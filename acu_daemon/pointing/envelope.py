@@ -119,8 +119,14 @@ class Envelope:
 
     def why_not(self, az_deg: float, el_deg: float, tai_s: float, slack_deg: float = 0.0) -> str:
         """Why the antenna must not be sent there; empty: it may.  slack_deg: beyond a limit, for what is rounded."""
+        if beyond := self.beyond_limits(az_deg, el_deg, slack_deg):
+            return beyond
+        zone = self.zone_at(az_deg, el_deg, tai_s)
+        return "" if zone is None else f"within the keep-out of {zone.name}"
+
+    def beyond_limits(self, az_deg: float, el_deg: float, slack_deg: float = 0.0) -> str:
+        """Which axis does not reach a place, and its limits; empty: both do."""
         for name, angle_deg, limits in (("azimuth", az_deg, self.azimuth), ("elevation", el_deg, self.elevation)):
             if not limits.min_deg - slack_deg <= angle_deg <= limits.max_deg + slack_deg:
                 return f"{name} outside {limits.min_deg:g} to {limits.max_deg:g} deg"
-        zone = self.zone_at(az_deg, el_deg, tai_s)
-        return "" if zone is None else f"within the keep-out of {zone.name}"
+        return ""

@@ -27,6 +27,7 @@ from acu_daemon.control.registers import count_refusals
 from acu_daemon.control.state import ControlState, StartStage
 from acu_daemon.pointing.envelope import Envelope
 
+DEEPER_DEG = 0.1  # what is no way further in: noise of a reading, rounding
 SELECTED_MODES = (AcuMode.STANDBY, AcuMode.REMOTE, AcuMode.AUTOTRACK)
 
 
@@ -66,9 +67,9 @@ def _of_kind(command: Command, state: ControlState, now_tai_s: float, config: Co
     stage, is_ready = state.startup.stage, state.startup.stage is StartStage.READY
     match command:
         case PointAndPoll(az_deg=az_deg, el_deg=el_deg) if is_ready:
-            return of_angles(az_deg, el_deg, now_tai_s, config.envelope, config.acu.angle_step_deg)
+            return _of_write(az_deg, el_deg, state, now_tai_s, config)
         case PointAt(az_deg=az_deg, el_deg=el_deg) if stage >= StartStage.SECTOR_FREE:
-            return of_angles(az_deg, el_deg, now_tai_s, config.envelope, config.acu.angle_step_deg)
+            return _of_write(az_deg, el_deg, state, now_tai_s, config)
         case SelectMode(mode=mode) if is_ready and mode in SELECTED_MODES:
             return ""
         case SelectBackup(backup=Backup.REMOTE) if is_ready:
@@ -76,6 +77,19 @@ def _of_kind(command: Command, state: ControlState, now_tai_s: float, config: Co
         case FreeTurnChoice() | SetWatchdog() if stage >= StartStage.REGISTERS_KNOWN:
             return ""
     return "not in its place"
+
+
+def _of_write(az_deg: float, el_deg: float, state: ControlState, now_tai_s: float, config: ControlConfig) -> str:
+    """An antenna that is within a keep-out may be led out of it, or stay; never further in."""
+    envelope, status = config.envelope, state.intake.status
+    refused = of_angles(az_deg, el_deg, now_tai_s, envelope, config.acu.angle_step_deg)
+    if not refused or not envelope.has_zones or status is None or not isfinite(az_deg + el_deg):
+        return refused
+    if envelope.beyond_limits(az_deg, el_deg, config.acu.angle_step_deg):
+        return refused
+    antenna_deg = envelope.clearance_deg(state.intake.az_deg, status.el_deg, now_tai_s)
+    is_out = antenna_deg < DEEPER_DEG and envelope.clearance_deg(az_deg, el_deg, now_tai_s) >= antenna_deg - DEEPER_DEG
+    return "" if is_out else refused
 
 
 def of_angles(az_deg: float, el_deg: float, now_tai_s: float, envelope: Envelope, step_deg: float) -> str:
