@@ -30,8 +30,13 @@ with atheris.instrument_imports(include=["acu_daemon"]):
     from acu_daemon.onboard.aem_attitude import AemAttitude
     from acu_daemon.onboard.parameter_file import read as read_parameters
     from acu_daemon.onboard.recheck import check_certificate, check_peaks
+    from acu_daemon.orbit.cpf import parse_cpf
+    from acu_daemon.orbit.element_set import Problem
+    from acu_daemon.orbit.ephemeris import Ephemeris
+    from acu_daemon.orbit.ephemeris_segment import EphemerisSegment
     from acu_daemon.orbit.oem import parse_oem
     from acu_daemon.orbit.omm import parse_omm
+    from acu_daemon.orbit.sp3 import parse_sp3
     from acu_daemon.orbit.tle import parse_tle
     from acu_daemon.sim.scenario import read_scenario
 
@@ -112,6 +117,22 @@ def oem(data: bytes) -> None:
     parse_oem(data.decode("utf-8", "replace"), "f")
 
 
+def cpf(data: bytes) -> None:
+    _states(*parse_cpf(data.decode("utf-8", "replace"), "f"))
+
+
+def sp3(data: bytes) -> None:
+    _states(*parse_sp3(data.decode("utf-8", "replace"), "f"))
+
+
+def _states(segments: list[EphemerisSegment], problems: list[Problem]) -> None:
+    """Segments that are read give states, or are refused as no orbit; where there are none it is said why."""
+    assert segments or problems
+    for segment in segments:
+        with contextlib.suppress(ElementsError):
+            Ephemeris([segment], EarthOrientation()).states(segment.tai_s[:1])
+
+
 def aem(data: bytes) -> None:
     """A message that is read can be asked for the attitude at its first state."""
     for segment in parse_aem(data.decode("utf-8", "replace"), "f")[0]:
@@ -128,7 +149,7 @@ def tracking_parameters(data: bytes) -> None:
 
 TARGETS: dict[str, Callable[[bytes], None]] = {
     target.__name__: target
-    for target in (codec, config, readings, scenario, carry_over, tle, omm, oem, aem, tracking_parameters)
+    for target in (codec, config, readings, scenario, carry_over, tle, omm, oem, cpf, sp3, aem, tracking_parameters)
 }
 
 

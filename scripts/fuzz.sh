@@ -10,7 +10,7 @@ if ! python -c 'import atheris' 2>/dev/null; then
     echo "== installing the extra 'fuzz'"
     pip install -qq --disable-pip-version-check --constraint constraints.txt --editable '.[fuzz]'
 fi
-targets=${*:-codec config readings scenario carry_over tle omm oem aem tracking_parameters}
+targets=${*:-codec config readings scenario carry_over tle omm oem cpf sp3 aem tracking_parameters}
 seconds=$((minutes * 60 / $(wc -w <<<"$targets")))
 mkdir -p fuzz-findings
 status=0

@@ -7,10 +7,9 @@ the times of a file go on as if there had been none, and the flag of the rows sa
 
 from dataclasses import dataclass, field
 from functools import partial
-from math import isfinite
 
 from acu_daemon.orbit.element_set import Problem
-from acu_daemon.orbit.ephemeris_rows import PositionRows, at, segments_of
+from acu_daemon.orbit.ephemeris_rows import LARGEST, PositionRows, at, segments_of
 from acu_daemon.orbit.ephemeris_segment import EphemerisSegment, Frame
 from acu_daemon.orbit.oem_text import BadSegmentError
 from acu_daemon.orbit.timescales import tai_from_unix, tai_from_utc
@@ -149,7 +148,7 @@ def _number(word: str, line: int) -> float:
         value = float(word.upper().replace("D", "E"))
     except ValueError:
         value = float("nan")
-    if not isfinite(value):
+    if not abs(value) < LARGEST:
         raise BadSegmentError(f"{word[:40]!r} is not a number", line)
     return value
 

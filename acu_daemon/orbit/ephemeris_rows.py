@@ -12,6 +12,7 @@ from acu_daemon.units import Array
 
 _GAP_STEPS = 2.5  # states farther apart than so many usual steps, one missing at most: a gap is between them
 _SAME_M = 1.0
+LARGEST = 1e12  # of a number in a file, whatever its unit: nothing that orbits the Earth is so far
 _LEAST_STATES = 2
 
 Vector = tuple[float, float, float]

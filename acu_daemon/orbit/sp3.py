@@ -7,10 +7,9 @@ zeros for what is not known.  Times are those of the header (%c), GPS time where
 import re
 from dataclasses import dataclass, field
 from functools import partial
-from math import isfinite
 
 from acu_daemon.orbit.element_set import Problem
-from acu_daemon.orbit.ephemeris_rows import PositionRows, Vector, at, segments_of
+from acu_daemon.orbit.ephemeris_rows import LARGEST, PositionRows, Vector, at, segments_of
 from acu_daemon.orbit.ephemeris_segment import EphemerisSegment, Frame
 from acu_daemon.orbit.oem_text import BadSegmentError
 from acu_daemon.orbit.timescales import tai_from_ccsds
@@ -188,7 +187,7 @@ def _vector(line: str, number: int) -> Vector:
             value = float(text)
         except ValueError:
             value = float("nan")
-        if not isfinite(value) or len(line) < first + 14:
+        if not abs(value) < LARGEST or len(line) < first + 14:
             raise BadSegmentError(f"columns {first + 1} to {first + 14} are {text[:20]!r}, not a number", number)
         values.append(value)
     return values[0], values[1], values[2]
