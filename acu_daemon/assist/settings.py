@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import inf
 
-from acu_daemon.model import AxisLimits
+from acu_daemon.model import AngleBias, AxisLimits
 from acu_daemon.orbit.propagator import EPHEMERIDES
 
 
@@ -78,7 +78,8 @@ class EstimatorSettings:
     `circular` averages, 3 to 8 (Aguirre and Medeiros 1988, 2.6c).
 
     For `full`: the biases' sigmas (model.AngleBias), those of NPAE, AN, AW and TF, the orbit's (None: from the kind of
-    elements and their age) and the station's, east and north each, metres.
+    elements and their age) and the station's, east and north each, metres.  For the others: known_bias, what the
+    encoders are known to show beyond the antenna model.
     """
 
     sigma_azimuth_deg: float = 0.05
@@ -95,6 +96,8 @@ class EstimatorSettings:
     bias_sigma_elevation_deg: float = 0.1
     bias_sigma_elevation_cot_deg: float = 0.0
     mount_sigmas_deg: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    is_collimation_surveyed: bool = False
+    known_bias: AngleBias = AngleBias()
     orbit_sigmas: ElementSigmas | StateSigmas | None = None
     station_sigma_m: float = 0.0
 

@@ -47,8 +47,8 @@ def control_config(
     )
 
 
-def estimator_settings(station: StationFile, satellite: SatelliteFile) -> EstimatorSettings:
-    """What the estimators need of the configuration."""
+def estimator_settings(station: StationFile, satellite: SatelliteFile | None) -> EstimatorSettings:
+    """What the estimators need of the configuration; without a satellite what they need of the station's."""
     return EstimatorSettings(
         sigma_azimuth_deg=station.readings.sigma_azimuth_deg,
         sigma_elevation_deg=station.readings.sigma_elevation_deg,
@@ -62,9 +62,21 @@ def estimator_settings(station: StationFile, satellite: SatelliteFile) -> Estima
         bias_sigma_elevation_cot_deg=hypot(
             station.readings.bias_sigma_elevation_cot_deg, station.atmosphere.cot_sigma_deg(station.site.station)
         ),
+        is_collimation_surveyed=station.mount.ca_sigma_deg is not None,
         mount_sigmas_deg=station.mount.axis_sigmas_deg,
-        orbit_sigmas=_orbit_sigmas(satellite.uncertainty),
+        orbit_sigmas=None if satellite is None else _orbit_sigmas(satellite.uncertainty),
         station_sigma_m=station.station.uncertainty_m / 2**0.5,  # of east and of north each
+    )
+
+
+def pedestal_text(station: StationFile) -> str:
+    """What a memory of the mount is of: of another pedestal it says nothing."""
+    place, azimuth, elevation = station.site.station, station.acu.azimuth, station.acu.elevation
+    surveyed = " ".join(f"{name} {value:g}" for name, value in station.mount.model_dump().items() if value is not None)
+    return (
+        f"{place.name} {place.latitude_deg:.4f} {place.longitude_deg:.4f} {place.height_m:.0f} m; azimuth "
+        f"{azimuth.min_deg:g} to {azimuth.max_deg:g}, elevation {elevation.min_deg:g} to {elevation.max_deg:g} deg; "
+        f"{'air' if station.atmosphere.has_refraction else 'vacuum'}; {surveyed}"
     )
 
 

@@ -1,15 +1,17 @@
 """The estimators by name, behind one protocol.  Pure."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Protocol
 
 from acu_daemon.assist.estimators.averages import CircularEstimator, DeterministicEstimator
 from acu_daemon.assist.estimators.full.carry_over import CarryOver
 from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
+from acu_daemon.assist.estimators.full.pedestal_prior import PedestalPrior
 from acu_daemon.assist.estimators.kalman import KalmanEstimator
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.errors import UsageError
-from acu_daemon.model import FitResult, Readings, Site
+from acu_daemon.model import AngleBias, FitResult, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
 
 __all__ = ["ESTIMATORS", "Estimator", "EstimatorSettings", "has_covariance", "make_estimator"]
@@ -47,16 +49,24 @@ def has_covariance(name: str) -> bool:
 
 
 def make_estimator(
-    name: str, propagator: Propagator, site: Site, settings: EstimatorSettings, carried: CarryOver | None = None
+    name: str,
+    propagator: Propagator,
+    site: Site,
+    settings: EstimatorSettings,
+    carried: CarryOver | None = None,
+    pedestal: PedestalPrior | None = None,
 ) -> Estimator:
     """Make an estimator that corrects a source.
 
     name: circular, deterministic, kalman or full.
     carried: what an earlier pass left, an accepted one; without a meaning for estimators without covariance.
+    pedestal: what passes of any satellite showed of the antenna.  Estimators without covariance see readings less its
+    means, and their fits have them as biases.
     Raises:  UsageError: no such estimator.
     """
     if name not in ESTIMATORS:
         raise UsageError(f"no estimator {name!r}: expected one of {', '.join(ESTIMATORS)}")
     if has_covariance(name):
-        return FullEstimator(propagator, site, settings, carried, may_widen=True)
-    return ESTIMATORS[name](propagator, site, settings)
+        return FullEstimator(propagator, site, settings, carried, may_widen=True, pedestal=pedestal)
+    known = AngleBias() if pedestal is None else pedestal.bias
+    return ESTIMATORS[name](propagator, site, replace(settings, known_bias=known))

@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from acu_daemon.assist.estimators.known_bias import without_bias
 from acu_daemon.assist.reading_gate import ReadingGate, Rejected
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.assist.spaced_times import spaced
-from acu_daemon.model import Correction, FitResult, Readings, Site, sky_angle_deg
+from acu_daemon.model import AngleBias, Correction, FitResult, Readings, Site, sky_angle_deg
 from acu_daemon.orbit.frames import station_itrs_m, teme_from_itrs
 from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.propagator import Propagator
@@ -67,13 +68,15 @@ class BaseEstimator(ABC):
 
     def _geometric(self, readings: Readings) -> Readings:
         """Readings without air and mount; how far away the satellite is, which matters little, the source says."""
-        antenna = self._site.antenna
-        if antenna is None:
+        antenna, bias = self._site.antenna, self._settings.known_bias
+        if antenna is None and bias == AngleBias():
             return readings
         few = spaced(readings.tai_s, _RANGE_STEP_S)
         range_m = np.interp(readings.tai_s, few, look_at(self._source, few, self._site).range_m)
-        az_deg, el_deg = antenna.geometric_deg(readings.az_deg, readings.el_deg, range_m)
-        return replace(readings, az_deg=az_deg % 360.0, el_deg=el_deg)
+        if antenna is not None:
+            az_deg, el_deg = antenna.geometric_deg(readings.az_deg, readings.el_deg, range_m)
+            readings = replace(readings, az_deg=az_deg % 360.0, el_deg=el_deg)
+        return without_bias(readings, bias, self._site, range_m)
 
     def fit(self) -> FitResult | None:
         """Give the fit to all readings so far; None while there are too few."""
@@ -95,6 +98,7 @@ class BaseEstimator(ABC):
             residual_rms_deg=float(np.sqrt(np.mean(residuals**2))),
             along_s=along_s,
             across_deg=across_deg,
+            bias=self._settings.known_bias,
         )
 
 

@@ -9,6 +9,9 @@ from dataclasses import dataclass, field, replace
 from acu_daemon.assist.estimators.estimator import Estimator, EstimatorSettings, has_covariance, make_estimator
 from acu_daemon.assist.estimators.full.carry_over import CarryOver, aged_prior, first_fit
 from acu_daemon.assist.estimators.full.full_estimator import FullEstimator, shift_for_people
+from acu_daemon.assist.estimators.full.pedestal_prior import PedestalPrior
+from acu_daemon.assist.mount_memory.pedestal_memory import PedestalMemory, prior_of
+from acu_daemon.assist.mount_memory.whole_pass import LEAST_S, PassEstimate, estimate_pass
 from acu_daemon.assist.reading_gate import OUTLIER
 from acu_daemon.assist.screening.track_gate import TrackGate
 from acu_daemon.assist.session.model_choice import ModelChoice, choose, is_good, newest_residual_deg
@@ -22,6 +25,7 @@ BATCH_S = 1.0  # readings are judged by the fit to those before them: so many at
 BATCH_SHARE = 0.1  # or this share of what was taken already, such as when a new child is given a whole pass
 RESTART_S = 30.0  # a fit that is bad again and again starts afresh with the newest readings
 CARRIED_S = 10.0  # so long its readings must contradict what it began with
+ESTIMATE_SHARE = 0.1  # what a pass says of the pedestal is reckoned again with so many more seconds of readings
 DROPPED = "the last pass's orbit is dropped: the fits that began with it stayed far from the newest readings"
 
 
@@ -31,6 +35,7 @@ class RefitSetup:
 
     carried: what an earlier pass left and was accepted, which only estimators with a covariance use; or
     the fit of this pass that the daemon had when it was started again: it goes on from it.
+    memory: what the station knows of its antenna; None: no such thing is kept, the configuration says it all.
     """
 
     propagator: Propagator
@@ -41,6 +46,7 @@ class RefitSetup:
     step_s: float = 0.1
     carried: CarryOver | None = None
     zenith_objective: Objective = "largest_error"
+    memory: PedestalMemory | None = None
 
     @property
     def keyhole(self) -> KeyholeRules:
@@ -78,13 +84,17 @@ class GateVerdict:
 
 @dataclass(frozen=True, slots=True)
 class RefitReply:
-    """The newest fit, the buffer, and what people should know.  The fit is None while another model is in use."""
+    """The newest fit, the buffer, and what people should know.  The fit is None while another model is in use.
+
+    estimate: what the pass says of the pedestal so far, where that is new.
+    """
 
     fit: FitResult | None
     prediction: Prediction
     notes: tuple[str, ...] = ()
     model: Model = Model.ELEMENTS
     gate: GateVerdict = GateVerdict()
+    estimate: PassEstimate | None = None
 
 
 class Refitter:
@@ -97,6 +107,8 @@ class Refitter:
         self._gate = TrackGate(setup.propagator, setup.site, setup.settings)
         self._choice = ModelChoice()
         self._said: set[str] = set()
+        self._pedestal: PedestalPrior | None = None
+        self._estimated_to_tai_s = self._estimated_span_s = 0.0
         self._begin_fit()
 
     def refit(self, request: RefitRequest) -> RefitReply:
@@ -104,6 +116,10 @@ class Refitter:
 
         Raises: OrbitError: the propagator has no answer for the span.
         """
+        memory = self._setup.memory
+        if self._pedestal is None and memory is not None and memory.pass_count:
+            self._pedestal = prior_of(memory, self._setup.settings, request.now_tai_s)
+            self._begin_fit()
         for batch in self._batches(request.readings):
             self._take(batch)
         notes = self._take_notes()
@@ -115,7 +131,7 @@ class Refitter:
             self._begin_fit()
             models = self._models(request.now_tai_s)
             self._choose(models, has_news=True)
-        return self._reply(request, models, notes)
+        return replace(self._reply(request, models, notes), estimate=self._estimate(has_news=len(request.readings) > 0))
 
     def _batches(self, readings: Readings) -> Iterator[Readings]:
         while len(readings):
@@ -149,9 +165,11 @@ class Refitter:
         """Make the estimator afresh, and one for the gate, which needs a sigma, and give them the kept readings."""
         setup = self._setup
         what = (setup.propagator, setup.site, setup.settings)
-        self._estimator: Estimator = make_estimator(setup.estimator, *what, self._carried)
-        self._judge: Estimator = (
-            self._estimator if has_covariance(setup.estimator) else FullEstimator(*what, may_widen=True)
+        self._estimator: Estimator = make_estimator(setup.estimator, *what, self._carried, self._pedestal)
+        self._judge: FullEstimator = (
+            self._estimator
+            if isinstance(self._estimator, FullEstimator)
+            else FullEstimator(*what, may_widen=True, pedestal=self._pedestal)
         )
         self._estimators = [self._estimator] if self._judge is self._estimator else [self._estimator, self._judge]
         if len(self._gate.kept):
@@ -162,9 +180,22 @@ class Refitter:
         notes, self._estimator.notes[:] = tuple(self._estimator.notes), ()
         if notes:  # the readings rejected what was carried over
             self._carried = self._resumed = None
+        notes, self._judge.pedestal_notes[:] = (*notes, *self._judge.pedestal_notes), ()
         new = tuple(note for note in notes if note not in self._said)  # an estimator made afresh finds the same again
         self._said.update(new)
         return new
+
+    def _estimate(self, *, has_news: bool) -> PassEstimate | None:
+        """What the pass says of the pedestal, where it has gone on by a tenth, or readings have stopped coming."""
+        setup, kept = self._setup, self._gate.kept
+        if setup.memory is None or len(kept) == 0 or self._judge.seen is None:
+            return None
+        last, span_s = float(kept.tai_s[-1]), float(kept.tai_s[-1] - kept.tai_s[0])
+        is_due = span_s - self._estimated_span_s >= max(LEAST_S / 2.0, ESTIMATE_SHARE * span_s)
+        if span_s < LEAST_S or last == self._estimated_to_tai_s or (has_news and not is_due):
+            return None
+        self._estimated_to_tai_s, self._estimated_span_s = last, span_s
+        return estimate_pass(setup.propagator, setup.site, setup.settings, setup.memory, self._judge.seen)
 
     def _models(self, now_tai_s: float) -> dict[Model, FitResult | None]:
         """The models there are, each with what it adds to the elements."""
@@ -213,7 +244,8 @@ def before_fit(setup: RefitSetup, now_tai_s: float) -> FitResult | None:
     carried, source = setup.carried, setup.propagator
     if carried is None or not (carried.is_of_this_pass or has_covariance(setup.estimator)):
         return None
-    fit = first_fit(carried, aged_prior(carried, source, setup.site, setup.settings, now_tai_s))
+    pedestal = None if setup.memory is None else prior_of(setup.memory, setup.settings, now_tai_s)
+    fit = first_fit(carried, aged_prior(carried, source, setup.site, setup.settings, now_tai_s, pedestal))
     if not carried.is_of_this_pass:
         return fit
     along_s, across_deg = shift_for_people(source, fit.correction, fit.at_tai_s, setup.site)

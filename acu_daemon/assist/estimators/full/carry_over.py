@@ -22,6 +22,7 @@ from acu_daemon.assist.estimators.full.estimated_states import (
     shift_of,
     states_of,
 )
+from acu_daemon.assist.estimators.full.pedestal_prior import PedestalPrior
 from acu_daemon.assist.estimators.full.prior_inflation import WIDTHS
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings, StateSigmas
 from acu_daemon.errors import OrbitError
@@ -178,16 +179,23 @@ def why_not(carried: CarryOver, source: Propagator, settings: EstimatorSettings,
 
 
 def aged_prior(
-    carried: CarryOver, source: Propagator, site: Site, settings: EstimatorSettings, at_tai_s: float
+    carried: CarryOver,
+    source: Propagator,
+    site: Site,
+    settings: EstimatorSettings,
+    at_tai_s: float,
+    pedestal: PedestalPrior | None = None,
 ) -> Prior:
     """What the carry-over tells of the states at at_tai_s, in place of `make_prior`.
 
     The mean motion is first held to what elements are worth over days: within one pass its error looks like others',
     and what a pass's noise leaves in it runs away until the next.  What is left of the correction counts as far as it
     stands out from its own uncertainty.  Then come drag, as a constant error of the mean motion's rate from the fit on,
-    and slow drifts.  A fit of this pass is taken as it is.
+    and slow drifts.  What the station remembers of its pedestal (of more passes than that one) takes the place of the
+    biases.  A fit of this pass is taken as it is.
     """
     fresh = make_prior(source, settings, at_tai_s)
+    fresh = fresh if pedestal is None else pedestal.of(fresh)
     if carried.is_of_this_pass:
         return _without_fixed(_mean(carried), carried.covariance.copy(), fresh)
     mean, covariance = _held_to_long_mean_motion(_mean(carried), carried, settings)
@@ -195,7 +203,8 @@ def aged_prior(
     covariance = covariance + _process_noise(carried, settings, np.diag(fresh.covariance), at_tai_s)
     if carried.station != site.station:
         mean, covariance = _orbit_alone(mean, covariance, fresh)
-    return _without_fixed(mean, covariance, fresh)
+    prior = _without_fixed(mean, covariance, fresh)
+    return prior if pedestal is None else pedestal.of(prior)
 
 
 def _without_fixed(mean: Array, covariance: Array, fresh: Prior) -> Prior:

@@ -1,6 +1,6 @@
 """The `full` estimator: six orbit corrections, angle biases and the station's place, with their covariance.  Pure."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from acu_daemon.assist.estimators.full.elements_discrepancy import describe_disc
 from acu_daemon.assist.estimators.full.estimated_states import Prior, bias_of, correction_of, make_prior, shift_of
 from acu_daemon.assist.estimators.full.least_squares import Batch, Solution, solve
 from acu_daemon.assist.estimators.full.normal_points import Sights, sights
+from acu_daemon.assist.estimators.full.pedestal_prior import LOG_ODDS, Doubt, PedestalPrior, doubt_of
 from acu_daemon.assist.estimators.full.prior_inflation import WIDTHS, is_strained, most_likely
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import Correction, FitResult, Readings, Site
@@ -18,6 +19,8 @@ from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import DEG
 
 _NEWEST_COUNT = 30
+SURE_AGAIN = 2.0  # by so much, in its logarithm, the memory must be likelier to be used again
+TRUSTED_AGAIN = "the encoders are as the last passes had them: the memory of them is used again"
 _RETRY_SHARE = 1.3  # so many more readings until another widening is tried
 
 
@@ -34,14 +37,21 @@ class FullEstimator(BaseEstimator):
         carried: CarryOver | None = None,
         *,
         may_widen: bool = False,
+        pedestal: PedestalPrior | None = None,
     ) -> None:
         """Take what an earlier pass left; it is dropped, with a note, when a minute of readings rejects it.
+
+        pedestal: what earlier passes, of any satellite, showed of it; set aside, with a note, while the readings are
+        likelier with encoders that were re-zeroed.
 
         may_widen: elements are worth less, with a note, when the readings show them to be far worse than they should
         be; only for readings that are known to be the satellite's.
         """
         super().__init__(propagator, site, settings)
         self._carried = carried
+        self._pedestal = pedestal
+        self._is_rezeroed = False
+        self.pedestal_notes: list[str] = []  # what people should be told of the memory of the pedestal
         self._carry_over_test: CarryOverTest | None = None
         self._batch: Batch | None = None
         self._parts: list[Sights] = []
@@ -74,14 +84,21 @@ class FullEstimator(BaseEstimator):
     def _start(self, first_tai_s: float) -> None:
         """Begin with what is known before the first reading, the one at first_tai_s."""
         self._solution = None
-        self._batch = Batch(self._source, self._site, self._settings, self._prior(first_tai_s))
+        noise = None if self._doubted is None else self._doubted.noise
+        self._batch = Batch(self._source, self._site, self._settings, self._prior(first_tai_s), noise)
         if self._carried is not None:
             self._carry_over_test = CarryOverTest(self._source, self._site, self._settings, self._batch.prior)
 
     def _prior(self, at_tai_s: float) -> Prior:
         if self._carried is None:
-            return make_prior(self._source, self._settings, at_tai_s)
-        return aged_prior(self._carried, self._source, self._site, self._settings, at_tai_s)
+            prior = make_prior(self._source, self._settings, at_tai_s)
+            return prior if self._pedestal is None else self._pedestal.of(prior)
+        return aged_prior(self._carried, self._source, self._site, self._settings, at_tai_s, self._pedestal)
+
+    @property
+    def _doubted(self) -> PedestalPrior | None:
+        """What the readings are asked to deny; nothing in a pass that is gone on with: its fit has them in it."""
+        return None if self._carried is not None and self._carried.is_of_this_pass else self._pedestal
 
     def _correction(self) -> Correction | None:
         return None if self._solution is None else correction_of(self._solution.x)
@@ -101,8 +118,33 @@ class FullEstimator(BaseEstimator):
         return self._fit
 
     def _solve(self, batch: Batch, seen: Sights) -> Solution:
+        """Solve with what is known of the pedestal, or, where that is less likely, with encoders re-zeroed since.
+
+        That is asked first: else re-zeroed encoders would look like elements that are worse than they are.
+        """
+        pedestal = self._doubted
+        if pedestal is None:
+            return self._widened(batch, seen, solve(WIDTHS[self._width].of(batch), seen, self._solution))
+        rezeroed = replace(batch, prior=pedestal.rezeroed.of(batch.prior))
+        before = self._is_rezeroed
+        solution = solve(WIDTHS[self._width].of(rezeroed if before else batch), seen, self._solution)
+        doubt = doubt_of(pedestal, solution.x, solution.covariance, is_rezeroed=before)
+        self._is_rezeroed = doubt.log_evidence + LOG_ODDS > (-SURE_AGAIN if before else 0.0)
+        batch = rezeroed if self._is_rezeroed else batch
+        if before is not self._is_rezeroed:
+            self.pedestal_notes.append(_why_rezeroed(doubt) if self._is_rezeroed else TRUSTED_AGAIN)
+            solution = solve(WIDTHS[self._width].of(batch), seen, solution)
+        return self._widened(batch, seen, solution)
+
+    @property
+    def seen(self) -> Sights | None:
+        """All readings so far, geometric."""
+        self._parts = [_joined(self._parts)] if self._parts else []
+        return self._parts[0] if self._parts else None
+
+    def _widened(self, batch: Batch, seen: Sights, solution: Solution) -> Solution:
+        """The solution, or one with elements that are worth less, where the readings show that."""
         given = WIDTHS[self._width].of(batch)
-        solution = solve(given, seen, self._solution)
         may_widen = self._may_widen and self._carried is None and seen.tai_s.size >= self._next_try_count
         if not may_widen or not is_strained(given, solution):
             return solution
@@ -136,6 +178,14 @@ class FullEstimator(BaseEstimator):
             station_shift_enu_m=shift_of(solution.x),
             covariance=solution.covariance,
         )
+
+
+def _why_rezeroed(doubt: Doubt) -> str:
+    ia_deg, ie_deg = doubt.shift_rad / DEG
+    return (
+        f"the encoders seem to have been re-zeroed since the last passes, by {ia_deg:+.2f} deg in azimuth and "
+        f"{ie_deg:+.2f} in elevation: the memory of them is set aside"
+    )
 
 
 def _joined(parts: list[Sights]) -> Sights:

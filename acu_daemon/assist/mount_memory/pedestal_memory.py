@@ -1,0 +1,154 @@
+"""The pedestal's state from pass to pass: two memories and how likely they are, aged, updated, doubted.  Pure.
+
+Theory: docs/estimation.md, Memory of the mount.  `const` knows IA, CA, IE and the scale of the refraction, `mount` also
+NPAE, AN, AW and TF: which of the two predicts is decided by how likely whole passes were under each.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from acu_daemon.assist.estimators.full.estimated_states import MOUNT
+from acu_daemon.assist.estimators.full.noise_correlation import WHITE, NoiseCorrelation
+from acu_daemon.assist.estimators.full.pedestal_prior import IA, IE, PEDESTAL_TERMS, RF, Doubt, PedestalPrior
+from acu_daemon.assist.settings import EstimatorSettings
+from acu_daemon.units import DAY_S, DEG, Array
+
+COUNT = len(PEDESTAL_TERMS)
+UNSURVEYED_SIGMA_DEG = 0.03  # of CA, NPAE, AN, AW, TF of a mount that nobody surveyed
+PREFERRED = 3.0  # so much likelier, in its logarithm, whole passes must be with the mount's terms
+LATEST_COUNT = 3  # of passes that are asked together whether an encoder was re-zeroed
+_WALK_DEG = np.array([0.005, 0.0005, 0.005, 0.0, 0.0005, 0.002, 0.002, 0.0005])  # per square root of a day
+_OF_A_PASS_DEG = np.array([0.008, 0.0, 0.008, 0.0, 0.0, 0.004, 0.004, 0.0])  # what comes and goes: sun, wind
+_WALK_SHARE, _OF_A_PASS_SHARE = 0.3, 0.4  # of the a-priori sigma, for the refraction: its scale goes with the weather
+_NOISE_PASSES = 4.0  # what is known of the noise is an average over about so many
+
+
+@dataclass(frozen=True)
+class Remembered:
+    """Mean (8,), rad, and covariance (8, 8) of IA, CA, IE, RF, NPAE, AN, AW, TF; no variance: not estimated."""
+
+    mean: Array
+    covariance: Array = field(repr=False)
+
+
+@dataclass(frozen=True)
+class PedestalMemory:
+    """What is known after pass_count passes, the last at at_tai_s.
+
+    evidence: how much likelier those passes were with `mount`, in its logarithm.  doubts: what the last of them say
+    against the memory before them.
+    """
+
+    at_tai_s: float
+    pass_count: int
+    const: Remembered
+    mount: Remembered
+    evidence: float = 0.0
+    doubts: tuple[Doubt, ...] = ()
+    noise: NoiseCorrelation = WHITE
+
+    @property
+    def has_mount(self) -> bool:
+        """Whether the mount's terms predict."""
+        return self.evidence > PREFERRED
+
+    @property
+    def chosen(self) -> Remembered:
+        return self.mount if self.has_mount else self.const
+
+
+def first_memory(settings: EstimatorSettings, at_tai_s: float) -> PedestalMemory:
+    """What is known before any pass: the sigmas of the configuration."""
+    const, mount = (Remembered(np.zeros(COUNT), np.diag(one**2)) for one in a_priori_sigmas(settings))
+    return PedestalMemory(at_tai_s, 0, const, mount)
+
+
+def a_priori_sigmas(settings: EstimatorSettings) -> tuple[Array, Array]:
+    """Of const and of mount, (8,) each, rad.  What [mount] says is surveyed has that sigma in both."""
+    bias_deg = (
+        settings.bias_sigma_azimuth_deg,
+        settings.bias_sigma_azimuth_sec_deg,
+        settings.bias_sigma_elevation_deg,
+        settings.bias_sigma_elevation_cot_deg,
+    )
+    const = np.radians([*bias_deg, *settings.mount_sigmas_deg])
+    mount = const.copy()
+    axes = slice(COUNT - (MOUNT.stop - MOUNT.start), COUNT)
+    mount[axes] = np.where(const[axes] > 0.0, const[axes], UNSURVEYED_SIGMA_DEG * DEG)
+    if not settings.is_collimation_surveyed:
+        mount[1] = max(mount[1], UNSURVEYED_SIGMA_DEG * DEG)
+    return const, mount
+
+
+def aged(memory: PedestalMemory, settings: EstimatorSettings, at_tai_s: float) -> PedestalMemory:
+    """The memory at a time: what drifts is known less well, at worst as well as before any pass."""
+    days = abs(at_tai_s - memory.at_tai_s) / DAY_S
+    const, mount = (
+        replace(one, covariance=grown(one.covariance, _walk(sigma) * days, sigma))
+        for one, sigma in zip((memory.const, memory.mount), a_priori_sigmas(settings), strict=True)
+    )
+    return replace(memory, at_tai_s=at_tai_s, const=const, mount=mount)
+
+
+def grown(covariance: Array, more: Array, sigma: Array) -> Array:
+    """A covariance with variances added, bounded by those before any pass; correlations stay bounded with them."""
+    grown = covariance + np.diag(more)
+    variance = np.diag(grown)
+    scale = np.where(variance > sigma**2, sigma / np.sqrt(np.where(variance > 0.0, variance, 1.0)), 1.0)
+    bounded: Array = grown * np.outer(scale, scale)
+    return bounded
+
+
+def _walk(sigma: Array) -> Array:
+    """Variances that a day adds, (8,); none to what is not estimated."""
+    walk_deg = _WALK_DEG.copy()
+    walk_deg[RF] = _WALK_SHARE * sigma[RF] / DEG
+    return np.where(sigma > 0.0, (walk_deg * DEG) ** 2, 0.0)
+
+
+def of_a_pass(sigma: Array) -> Array:
+    """Variances that every pass has of its own, (8,)."""
+    own_deg = _OF_A_PASS_DEG.copy()
+    own_deg[RF] = _OF_A_PASS_SHARE * sigma[RF] / DEG
+    return np.where(sigma > 0.0, (own_deg * DEG) ** 2, 0.0)
+
+
+def priors(memory: PedestalMemory, settings: EstimatorSettings, at_tai_s: float) -> tuple[PedestalPrior, PedestalPrior]:
+    """What const and mount say of a pass at a time."""
+    now = aged(memory, settings, at_tai_s)
+    const, mount = (
+        PedestalPrior(one.mean, grown(one.covariance, of_a_pass(sigma), sigma), memory.noise)
+        for one, sigma in zip((now.const, now.mount), a_priori_sigmas(settings), strict=True)
+    )
+    return const, mount
+
+
+def prior_of(memory: PedestalMemory, settings: EstimatorSettings, at_tai_s: float) -> PedestalPrior | None:
+    """What predicts in a pass at a time; None before the first pass: then the configuration says it."""
+    if memory.pass_count == 0:
+        return None
+    const, mount = priors(memory, settings, at_tai_s)
+    return mount if memory.has_mount else const
+
+
+def smoothed_noise(memory: PedestalMemory, seen: NoiseCorrelation) -> NoiseCorrelation:
+    """What is known of the noise after another pass."""
+    count = min(float(memory.pass_count), _NOISE_PASSES)
+    return NoiseCorrelation(
+        (count * memory.noise.successive + seen.successive) / (count + 1.0),
+        (count * memory.noise.excess + seen.excess) / (count + 1.0),
+    )
+
+
+def rezeroed(memory: PedestalMemory, doubt: Doubt) -> PedestalMemory:
+    """The memory with IA and IE moved by what the last passes say, and known as well as they say."""
+    zeros = np.ix_((IA, IE), (IA, IE))
+
+    def moved(one: Remembered) -> Remembered:
+        mean, covariance = one.mean.copy(), one.covariance.copy()
+        mean[[IA, IE]] += doubt.shift_rad
+        covariance[zeros] += doubt.covariance
+        return Remembered(mean, covariance)
+
+    return replace(memory, const=moved(memory.const), mount=moved(memory.mount), doubts=())
