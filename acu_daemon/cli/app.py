@@ -64,6 +64,20 @@ GROUPS: dict[str, Group] = {
             "from-passes": ("groundtrack_passes", "command"),
         },
     ),
+    "mount": Group(
+        """
+        What the station remembers of its antenna: zero points of the encoders, axes, sag, the scale of the refraction.
+
+        Every pass that `run` tracks to its end adds to it, whatever the satellite, and the next one begins with it:
+        docs/estimation.md, Memory of the mount.  Nothing of it goes into a command but through the fit of a pass; what
+        is to hold always goes into [mount] of station.toml, and `mount fit` says what that would be.
+        """,
+        {
+            "show": ("mount_commands", "show"),
+            "fit": ("mount_commands", "fit"),
+            "forget": ("mount_commands", "forget"),
+        },
+    ),
     "onboard": Group(
         """
         The antenna on the satellite: tracking profiles of a steerable downlink antenna over a pass (Song et al. 2016).

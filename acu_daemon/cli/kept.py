@@ -18,12 +18,14 @@ from acu_daemon.assist.estimators.full.carry_over import (
     why_not_resume,
     why_other_frame,
 )
+from acu_daemon.assist.mount_memory.pedestal_memory import PedestalMemory
 from acu_daemon.cli.options import Target
-from acu_daemon.config.to_settings import estimator_settings
+from acu_daemon.config.to_settings import estimator_settings, pedestal_text
 from acu_daemon.control.state import ControlState, Held, remembered
 from acu_daemon.edge.carry_over_file import FitKeeper, carry_over_path, read_carry_over
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.latch import DISARMED, LATCH, LatchKeeper, read_latch
+from acu_daemon.edge.mount_memory_file import MOUNT, MountKeeper, mount_files, open_mount_file
 from acu_daemon.edge.run_state import RUN_STATE, RunState, RunStateKeeper, read_run_state
 from acu_daemon.edge.writer import Writer
 from acu_daemon.model import FitResult, Pass
@@ -31,16 +33,19 @@ from acu_daemon.model import FitResult, Pass
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """What was left, and the four that keep what this run leaves.
+    """What was left, and the five that keep what this run leaves.
 
     carried: the fit of this pass, where the daemon is started again in it, else what the last pass left.
+    memory: what the station knows of its antenna, from passes of any satellite.
     state: what the decision begins with.  A latch and a disarm stay until a person ends them, whatever the pass; what a
     person armed is armed for one pass.
     """
 
     carried: CarryOver | None
+    memory: PedestalMemory
     state: ControlState
     carry_over: FitKeeper
+    mount: MountKeeper
     run_state: RunStateKeeper
     latches: LatchKeeper
     disarms: LatchKeeper
@@ -59,7 +64,7 @@ class Kept:
     @property
     def problem(self) -> str:
         """What of it cannot be written now, and why; "": all is."""
-        keepers = (self.run_state, self.carry_over, self.latches, self.disarms)
+        keepers = (self.run_state, self.carry_over, self.mount, self.latches, self.disarms)
         return "; ".join(keeper.problem for keeper in keepers if keeper.problem)
 
     def flush(self) -> None:
@@ -86,6 +91,16 @@ def open_kept(
     resumed = _resumed(left, target, now_tai_s) if is_same_pass else None
     path = carry_over_path(directory, target.satellite.satellite.norad_id, target.satellite.satellite.name)
     from_path = _first_with(path.name, directory, older) / path.name
+    mount = open_mount_file(
+        next(iter(mount_files(directory, older)), directory / MOUNT),
+        pedestal_text(target.station),
+        estimator_settings(target.station, target.satellite),
+        target.elements.label,
+        coming.rise_tai_s,
+        now_tai_s,
+    )
+    if mount.memory.pass_count:
+        structlog.get_logger("mount").info("mount.used", passes=mount.memory.pass_count, terms=mount.memory.has_mount)
     first = RunState(
         satellite=target.elements.label,
         rise_tai_s=coming.rise_tai_s,
@@ -96,8 +111,10 @@ def open_kept(
     )
     return Kept(
         carried=resumed or _carried(target, from_path, now_tai_s),
+        memory=mount.memory,
         state=state,
         carry_over=FitKeeper(path, target.elements.label, partial(carry_over_of, source=source, site=site), files),
+        mount=MountKeeper(directory / MOUNT, mount, files),
         run_state=RunStateKeeper(directory, files, first, partial(resume_of, source=source, site=site)),
         latches=LatchKeeper(directory, files, latch, clock, LATCH, older, is_left_out=is_another),
         disarms=LatchKeeper(directory, files, disarmed_by, clock, DISARMED, older, is_left_out=is_another),

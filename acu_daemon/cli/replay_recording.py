@@ -1,5 +1,6 @@
 """`acu-daemon replay`: recorded readings through the daemon's own fit and prediction."""
 
+import json
 import sys
 import time
 from collections.abc import Callable
@@ -10,14 +11,17 @@ from typing import Annotated
 import typer
 
 from acu_daemon.assist.estimators.estimator import ESTIMATORS
+from acu_daemon.assist.mount_memory.pedestal_memory import PedestalMemory
 from acu_daemon.assist.screening.another_satellite import why_not_this_satellite
 from acu_daemon.assist.session.estimator_comparison import compare, locked_readings, what_is_left_out
 from acu_daemon.assist.session.refit import RefitSetup
 from acu_daemon.assist.session.replay_readings import BUFFER_S, Replayed, replay
 from acu_daemon.cli.options import SPARE_S, Config, Satellite, Target, lacking, load_target, whose_recording
 from acu_daemon.cli.outputs import refuse_unwritable
-from acu_daemon.config.to_settings import estimator_settings
+from acu_daemon.config.to_settings import estimator_settings, pedestal_text
 from acu_daemon.control.tracking.state_table import TrackState
+from acu_daemon.edge.carry_over_file import reason_of
+from acu_daemon.edge.mount_memory_file import from_json
 from acu_daemon.edge.recording import read_readings
 from acu_daemon.edge.recording_whose import read_whose
 from acu_daemon.errors import UsageError
@@ -33,6 +37,7 @@ class _Job:
 
     target: Target
     lines: list[tuple[str, Reading | None, float]]
+    memory: PedestalMemory | None = None
 
     @property
     def timed(self) -> list[tuple[float, Reading | None]]:
@@ -66,6 +71,14 @@ def command(
             f"OUT.png beside the files of --estimator {ALL}, else none.",
         ),
     ] = None,
+    memory: Annotated[
+        Path | None,
+        typer.Option(
+            "--memory",
+            metavar="FILE",
+            help="A mount.json of a state directory: what the station then knew of its antenna.  Default: nothing.",
+        ),
+    ] = None,
 ) -> None:
     """Predict every recorded instant from the locked readings before it, as the daemon would have.
 
@@ -91,7 +104,8 @@ def command(
     lines = read_readings(readings, lambda said: typer.echo(f"warning: {said}", err=True))
     if not lines:
         raise UsageError(f"{readings}: no readings below the header")
-    job = _Job(load_target(config, satellite, lines[0][2]), lines)
+    target = load_target(config, satellite, lines[0][2])
+    job = _Job(target, lines, None if memory is None else memory_of(memory, target))
     from_tai_s = lines[0][2] - longest_window_s(job.target.station.acu.azimuth.limits()) - SPARE_S
     if uncovered := lacking(job.target, f"{readings}", from_tai_s, lines[-1][2] + BUFFER_S + SPARE_S):
         raise UsageError(uncovered)
@@ -112,6 +126,17 @@ def command(
     if reasons := [*_said_otherwise(readings, job.target), *_fitted_otherwise(job)]:
         typer.echo(f"probably not this satellite, {job.target.elements.label}: {'; '.join(reasons)}", err=True)
         raise typer.Exit(1)
+
+
+def memory_of(path: Path, target: Target) -> PedestalMemory:
+    """The memory of a file, with its newest pass in it.  UsageError: it cannot be used, and why."""
+    try:
+        kept = from_json(json.loads(path.read_text()))
+    except (OSError, ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
+        raise UsageError(f"--memory {path}: {reason_of(error)}") from None
+    if kept.pedestal != (asked := pedestal_text(target.station)):
+        raise UsageError(f"--memory {path}: it is of another pedestal ({kept.pedestal}), not of this one ({asked})")
+    return kept.settled(estimator_settings(target.station, target.satellite))[0].memory
 
 
 def _said_otherwise(readings: Path, target: Target) -> list[str]:
@@ -147,6 +172,7 @@ def _replay_to(job: _Job, name: str, out: Path) -> list[Replayed]:
         name,
         estimator_settings(station, job.target.satellite),
         station.acu.azimuth.limits(),
+        memory=job.memory,
     )
     on_progress = _progress(name, len(job.lines)) if sys.stderr.isatty() else None
     results = list(replay(setup, job.timed, station.receiver.lock_dwell_s, on_progress))

@@ -18,6 +18,7 @@ import typer
 
 from acu_daemon import PROCESS_START_S
 from acu_daemon.assist.estimators.full.carry_over import CarryOver
+from acu_daemon.assist.mount_memory.pedestal_memory import PedestalMemory
 from acu_daemon.assist.session.refit import RefitSetup
 from acu_daemon.cli.clock_wait import wait_for_clock
 from acu_daemon.cli.elements_watch import ElementsWatch
@@ -247,6 +248,7 @@ def prepare(frame: RunSetup, target: Target, memory: ControlState | None = None)
         is_rehearsal=clock.is_rehearsal,
         end_tai_s=clock.tai_s() + frame.end_s - clock.monotonic_s(),
         carried=kept.carried,
+        memory=kept.memory,
     )
     job = replace(job, control=replace(job.control, is_shadow=frame.is_shadow))
     job = replace(job, state=kept.state if memory is None else memory, is_anew=memory is not None)
@@ -271,6 +273,7 @@ def make_job(
     is_rehearsal: bool,
     end_tai_s: float = math.inf,
     carried: CarryOver | None = None,
+    memory: PedestalMemory | None = None,
 ) -> PassJob:
     """What the files say, as the daemon needs it."""
     station = target.station
@@ -284,6 +287,7 @@ def make_job(
             station.acu.azimuth.limits(),
             carried=carried,
             zenith_objective=station.tracking.zenith_objective,
+            memory=memory,
         ),
         control=replace(control_config(station, target.satellite, driver, link.byte_time_s), is_rehearsal=is_rehearsal),
         coming=coming,
@@ -378,6 +382,7 @@ async def _run(
             snapshot_ticks=snapshot_ticks,
             on_reading=recording.add if recording else None,
             on_fit=now.kept.offer,
+            on_estimate=now.kept.mount.offer,
             on_state=now.kept.see,
             on_end=lambda: notifier("STOPPING=1"),  # no tick feeds the watchdog from here on: it lets the daemon stop
             files_alarm=files_alarm,

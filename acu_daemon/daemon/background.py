@@ -8,6 +8,7 @@ from typing import Any
 
 import structlog
 
+from acu_daemon.assist.mount_memory.whole_pass import PassEstimate
 from acu_daemon.assist.reading_gate import ABOVE_MAX_ELEVATION
 from acu_daemon.assist.session.refit import GateVerdict, RefitReply, RefitRequest, RefitSetup, before_fit, predict_from
 from acu_daemon.control.control_config import ControlConfig
@@ -60,6 +61,7 @@ class Background:
         low_water_s: float,
         control: ControlConfig,
         on_fit: Callable[[FitResult], None] | None = None,
+        on_estimate: Callable[[PassEstimate], None] | None = None,
     ) -> None:
         self._area = area
         self._runner = runner
@@ -69,6 +71,7 @@ class Background:
         self._low_water_s = low_water_s
         self._control = control
         self._on_fit = on_fit
+        self._on_estimate = on_estimate
         self._spans_tai_s = spans_tai_s(setup.propagator)
         self._due = asyncio.Event()
         self._last_tai_s = -1e18
@@ -270,6 +273,8 @@ class Background:
             self._log.warning("fit.note", note=note)
         if reply.fit is not None and self._on_fit is not None:
             self._on_fit(reply.fit)
+        if reply.estimate is not None and self._on_estimate is not None:
+            self._on_estimate(reply.estimate)
         area.refit_count += 1
         area.gate = reply.gate
         area.sky = replace(area.sky, prediction=reply.prediction, fit=reply.fit)

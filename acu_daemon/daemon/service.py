@@ -9,6 +9,7 @@ from typing import Any
 import structlog
 
 from acu_daemon.acu.driver import AcuDriver
+from acu_daemon.assist.mount_memory.whole_pass import PassEstimate
 from acu_daemon.assist.session.refit import RefitSetup
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.arming import begin_run
@@ -94,6 +95,7 @@ class Service:
         snapshot_ticks: int = 1,
         on_reading: Callable[[Reading], None] | None = None,
         on_fit: Callable[[FitResult], None] | None = None,
+        on_estimate: Callable[[PassEstimate], None] | None = None,
         on_state: Callable[[ControlState], None] | None = None,
         files_alarm: Callable[[], str] = str,
         elements_problem: Callable[[], str] = str,
@@ -132,6 +134,7 @@ class Service:
             low_water_s=job.low_water_s,
             control=job.control,
             on_fit=on_fit,
+            on_estimate=on_estimate,
         )
         self._foreground = Foreground(
             self._area, self._port, clock, job.control, after_tick=self._after_tick, on_reading=on_reading

@@ -137,14 +137,14 @@ def from_json(read: Any, satellite: str) -> CarryOver:
     if read["satellite"] != satellite:
         raise ValueError(f"it is of {read['satellite']!r}, not of {satellite!r}")
     elements, station = read["elements"], read["station"]
-    east_m, north_m, up_m = _numbers(read["station_shift_enu_m"], (3,)).tolist()
+    east_m, north_m, up_m = numbers(read["station_shift_enu_m"], (3,)).tolist()
     return CarryOver(
         at_tai_s=number(read["at_tai_s"]),
         estimator=str(read["estimator"]),
         station=Station(str(station["name"]), **_fields(station, Station, text="name")),
         elements_kind=str(elements["kind"]),
         elements_epoch_tai_s=number(elements["epoch_tai_s"]),
-        states=_numbers(elements["states_teme_m_m_s"], (2, 6)),
+        states=numbers(elements["states_teme_m_m_s"], (2, 6)),
         correction=Correction(**_fields(read["correction"], Correction)),
         bias=AngleBias(**_fields(_with_axes(read["bias"]), AngleBias)),
         station_shift_enu_m=(east_m, north_m, up_m),
@@ -186,7 +186,7 @@ def _with_axes(bias: Any) -> Any:
     return {**dict.fromkeys(MOUNT_TERMS, 0.0), **bias} if isinstance(bias, dict) else bias
 
 
-def _numbers(values: Any, shape: tuple[int, ...]) -> Array:
+def numbers(values: Any, shape: tuple[int, ...]) -> Array:
     array = np.array(values, dtype=np.float64)
     if array.shape != shape or not np.isfinite(array).all():
         raise ValueError(f"expected {' x '.join(map(str, shape))} numbers")
@@ -197,7 +197,7 @@ def _covariance(values: Any) -> Array:
     """Zeros belong to states that no fit changes, and to estimators that give none."""
     covariance = np.zeros((STATE_COUNT, STATE_COUNT))
     count = FORMER_STATE_COUNT if isinstance(values, list) and len(values) == FORMER_STATE_COUNT else STATE_COUNT
-    covariance[:count, :count] = _numbers(values, (count, count))
+    covariance[:count, :count] = numbers(values, (count, count))
     variance = np.diag(covariance)
     is_state = variance > 0.0
     unit = np.sqrt(variance[is_state])

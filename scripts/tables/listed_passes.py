@@ -26,8 +26,8 @@ _LISTS = (
 )
 BANDS_DEG = ((8.0, 30.0), (30.0, 60.0), (60.0, 85.0), (85.0, 90.0))  # highest elevations, taken in turn
 _LOW_M = 8e6
-_LATITUDES_DEG = (-67.0, -33.0, -15.0, 0.5, 28.0, 50.0, 69.0)
-_LEAST_S, _LEAST_EL_DEG = 200.0, 5.0
+LATITUDES_DEG = (-67.0, -33.0, -15.0, 0.5, 28.0, 50.0, 69.0)
+LEAST_S, LEAST_EL_DEG = 200.0, 5.0
 _AROUND_S = 150.0  # so much earlier or later the true pass may be
 _FAR_KM = 90.0
 _LATE_S = 10.0
@@ -75,10 +75,10 @@ def _moved(small: Correction, mean_anomaly_rad: float, motion_rad_s: float) -> C
 
 def listed_passes(wrong: Wrong, count: int, rng: np.random.Generator) -> Iterator[tuple[Sgp4Propagator, Sky]]:
     """Give so many passes: what the operator has, and the true sky."""
-    low, made = _low_orbits(), 0
+    low, made = low_orbits(), 0
     while made < count:
         source = Sgp4Propagator(low[int(rng.integers(len(low)))])
-        site = Site(Station("", float(rng.choice(_LATITUDES_DEG)), float(rng.uniform(-180.0, 180.0)), 100.0))
+        site = Site(Station("", float(rng.choice(LATITUDES_DEG)), float(rng.uniform(-180.0, 180.0)), 100.0))
         start_tai_s = source.epoch_tai_s + float(rng.uniform(0.3, 5.0)) * DAY_S
         expected = _pass_in(source, site, start_tai_s, BANDS_DEG[made % len(BANDS_DEG)])
         if expected is not None:
@@ -90,23 +90,23 @@ def listed_passes(wrong: Wrong, count: int, rng: np.random.Generator) -> Iterato
 def _pass_in(source: Sgp4Propagator, site: Site, start_tai_s: float, band_deg: tuple[float, float]) -> Pass | None:
     """The first pass within a day whose highest elevation lies in the band."""
     try:
-        found = find_passes(source, site, start_tai_s, start_tai_s + DAY_S, _LEAST_EL_DEG)
+        found = find_passes(source, site, start_tai_s, start_tai_s + DAY_S, LEAST_EL_DEG)
     except OrbitError:  # a satellite that has come down
         return None
-    good = (one for one in found if band_deg[0] <= one.culmination_el_deg < band_deg[1] and one.duration_s > _LEAST_S)
+    good = (one for one in found if band_deg[0] <= one.culmination_el_deg < band_deg[1] and one.duration_s > LEAST_S)
     return next(good, None)
 
 
 def _sky_of(truth: Sgp4Propagator, site: Site, expected: Pass) -> Sky:
     tai_s = np.arange(expected.rise_tai_s - _AROUND_S, expected.set_tai_s + _AROUND_S, 1.0)
     seen = look_at(truth, tai_s, site)
-    up = seen.el_deg >= _LEAST_EL_DEG
+    up = seen.el_deg >= LEAST_EL_DEG
     name = f"{truth.elements.name}, {float(seen.el_deg.max()):.0f} deg"
     return Sky(name, site, tai_s[up], seen.az_deg[up], seen.el_deg[up], seen.range_m[up])
 
 
 @cache
-def _low_orbits() -> list[ElementSet]:
+def low_orbits() -> list[ElementSet]:
     folder = PASSES.parent / "tle_sets"
     sets = [one for name in _LISTS for one in parse_tle((folder / name).read_text(), name)[0]]
     return [one for one in sets if one.semi_major_axis_m < _LOW_M]

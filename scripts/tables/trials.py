@@ -60,22 +60,22 @@ def tried(
     angles_deg = sky_angles_deg(seen.az_deg, seen.el_deg, rest.az_deg, rest.el_deg)
     drawn_deg = _worst_drawn_deg(source, site, fit, rest.tai_s)
     across = wrap_180_array(seen.az_deg - rest.az_deg) * np.cos(np.radians(rest.el_deg)) * DEG
-    distance2 = _distance2(across, (seen.el_deg - rest.el_deg) * DEG, *sky_covariance(corrected, rest.tai_s, site, fit))
+    squares = distance2(across, (seen.el_deg - rest.el_deg) * DEG, *sky_covariance(corrected, rest.tai_s, site, fit))
     return Trial(
         name=name,
         worst_deg=float(angles_deg.max()),
         bound_deg=float(np.median(drawn_deg)),
         bound_95_deg=float(np.quantile(drawn_deg, 0.95)),
         bound_share=float(np.mean(drawn_deg > ASKED_WORST_DEG)),
-        one_sigma=float(np.mean(distance2 < 1.0)),
-        two_sigma=float(np.mean(distance2 < 4.0)),
+        one_sigma=float(np.mean(squares < 1.0)),
+        two_sigma=float(np.mean(squares < 4.0)),
     )
 
 
-def _distance2(across: Array, upward: Array, c: Array, b: Array, e: Array) -> Array:
+def distance2(across: Array, upward: Array, c: Array, b: Array, e: Array) -> Array:
     """Squared distance in sigmas, (N,), of errors with the covariance c (across), b (both), e (upward)."""
-    distance2: Array = (across**2 * e - 2.0 * b * across * upward + upward**2 * c) / (c * e - b * b)
-    return distance2
+    squares: Array = (across**2 * e - 2.0 * b * across * upward + upward**2 * c) / (c * e - b * b)
+    return squares
 
 
 def _worst_drawn_deg(source: Propagator, site: Site, fit: FitResult, tai_s: Array) -> Array:
