@@ -94,7 +94,7 @@ def test_the_memory_of_another_pedestal_is_thrown_away_and_said(tmp_path: Path, 
         ("mount", {"ia_deg": 0.1}),
         ("mount", {"tf_sigma_deg": 0.01}),
         ("azimuth", {"max_deg": 260.0}),
-        ("atmosphere", {"refraction": not demo_target().station.atmosphere.has_refraction}),
+        ("atmosphere", {"refraction": not demo_target().station.atmosphere.refraction}),
         ("station", {"latitude_deg": 1.0}),
     ],
 )

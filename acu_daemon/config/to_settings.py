@@ -76,7 +76,7 @@ def pedestal_text(station: StationFile) -> str:
     return (
         f"{place.name} {place.latitude_deg:.4f} {place.longitude_deg:.4f} {place.height_m:.0f} m; azimuth "
         f"{azimuth.min_deg:g} to {azimuth.max_deg:g}, elevation {elevation.min_deg:g} to {elevation.max_deg:g} deg; "
-        f"{'air' if station.atmosphere.has_refraction else 'vacuum'}; {surveyed}"
+        f"{'air' if station.atmosphere.refraction else 'vacuum'}; {surveyed}"
     )
 
 
