@@ -23,18 +23,13 @@ from acu_daemon.sim.scenario import AcuChoice, Scenario, SkyErrors
 SHORT = {"before_s": 30.0, "after_s": 16.0}
 
 
-@pytest.mark.parametrize(("height_km", "top_deg"), [(705, 89.0), (800, 89.3), (500, 88.5)])
-def test_a_pass_that_autotrack_loses_for_seconds_is_not_lost_at_all(height_km: float, top_deg: float) -> None:
-    flight = over_the_zenith(overhead_target(height_km, top_deg), **SHORT)
+@pytest.mark.parametrize(("height_km", "top_deg", "before_s"), [(705, 89.0, 30.0), (500, 88.5, 60.0)])
+def test_a_pass_that_autotrack_loses_for_seconds_is_not_lost_at_all(
+    height_km: float, top_deg: float, before_s: float
+) -> None:
+    flight = over_the_zenith(overhead_target(height_km, top_deg), before_s=before_s, after_s=16.0)
     assert lost_s(flight) == 0.0
     assert flight.states()[-3:] == ["ZENITH", "HOLD/FITTED", "AUTOTRACK/FITTED"]
-
-
-def test_left_to_autotrack_it_is_lost() -> None:
-    target = overhead_target(705, 89.0, tracking={"zenith_takeover": "never"})
-    flight = over_the_zenith(target, **SHORT)
-    assert "ZENITH" not in flight.states()
-    assert lost_s(flight) > 2.0
 
 
 def test_through_the_zenith_itself_the_error_is_near_the_least_that_a_drive_can_do() -> None:
@@ -50,10 +45,7 @@ def test_a_signal_that_goes_while_the_antenna_is_led_past_the_zenith_is_held() -
     assert flight.states()[-3:] == ["ZENITH", "HOLD/FITTED", "AUTOTRACK/FITTED"]
 
 
-@pytest.mark.parametrize("killed_s", [-3.5, 2.0])
-def test_a_daemon_that_crashes_while_autotrack_is_deselected_goes_on_past_the_zenith(
-    tmp_path: Path, killed_s: float
-) -> None:
+def test_a_daemon_that_crashes_while_autotrack_is_deselected_goes_on_past_the_zenith(tmp_path: Path) -> None:
     """The antenna stands until there is another daemon: it is back on the plan, or past it on the path, in seconds."""
     target = overhead_target(705, 89.0)
     begin = TOP_TAI_S - 30.0
@@ -71,7 +63,7 @@ def test_a_daemon_that_crashes_while_autotrack_is_deselected_goes_on_past_the_ze
             rig.wait(0.1)
             states.append(str(rig.state.tracking.track))
 
-    until(killed_s)
+    until(-3.5)
     assert states[-1] == "ZENITH"
     rig.crash(0.0)
     until(21.0)
