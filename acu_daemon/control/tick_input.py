@@ -5,8 +5,9 @@ from enum import StrEnum
 
 from acu_daemon.acu.commands import Command
 from acu_daemon.acu.replies import AcuStatus, Refused, Reply
-from acu_daemon.model import FitResult, Prediction, Reading
+from acu_daemon.model import FitResult, Prediction, Reading, ZenithCrossing
 from acu_daemon.pointing.reach import OutOfReach
+from acu_daemon.pointing.turn_plan import Unwinding
 
 
 class Request(StrEnum):
@@ -69,6 +70,8 @@ class PassPlan:
     note: str = ""  # why the turn is not a good one, when no turn holds the whole pass
     beyond: tuple[OutOfReach, ...] = ()  # when which axis cannot follow
     learned_count: int = 0  # turns of the azimuth that were learned before it was made
+    unwindings: tuple[Unwinding, ...] = ()  # where no turn holds the whole pass: changes of the turn within it
+    crossing: ZenithCrossing | None = None  # of the zenith, by the elements
     hidden_tai_s: tuple[tuple[float, float], ...] = ()  # when it is behind the skyline, by its elements
 
 

@@ -32,6 +32,7 @@ from acu_daemon.errors import NoAcuError, UsageError
 from acu_daemon.model import FitResult, Pass, Reading
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.pointing.outage import kept_out, sun_outages
+from acu_daemon.pointing.reach import zenith_text
 
 FIRST_POLL_S = 10.0  # no good poll within this of the start ends the run
 LOOK_TICKS = 10
@@ -250,6 +251,7 @@ class Service:
             now_tai_s,
             elevation=axes.elevation,
             learned_count=state.turn.learned_count,
+            keyhole=job.refit.keyhole,
         )
         self._log.info(
             "pass.planned",
@@ -261,6 +263,11 @@ class Service:
         )
         if plan.note:
             self._log.warning("pass.wrap", note=plan.note)
+        for change in plan.unwindings:
+            in_s, by_deg = round(change.tai_s - now_tai_s, 1), round(change.by_deg)
+            self._log.warning("pass.unwinds", in_s=in_s, by_deg=by_deg, for_s=round(change.for_s, 1))
+        if plan.crossing is not None:
+            self._log.info("pass.zenith", what=zenith_text(plan.crossing))
         for one in plan.beyond:
             self._log.warning("pass.beyond_limits", axis=one.axis, for_s=round(one.duration_s, 1), what=str(one))
         envelope = axes.envelope

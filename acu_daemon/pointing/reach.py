@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from acu_daemon.model import AxisLimits
+from acu_daemon.model import AxisLimits, ZenithCrossing
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.pointing.wrap import ROUNDING_DEG, turns_of
 from acu_daemon.units import Array
@@ -31,6 +31,15 @@ class OutOfReach:
     def __str__(self) -> str:
         span = f"{utc_text(self.from_tai_s, 0)} to {utc_text(self.to_tai_s, 0)}"
         return f"{self.why} for {self.duration_s:.0f} s, {span}; the other axis follows"
+
+
+def zenith_text(crossing: ZenithCrossing) -> str:
+    """What a crossing of the zenith is expected to cost, for people."""
+    begin = f"{utc_text(crossing.departure_tai_s, 0)} to {utc_text(crossing.return_tai_s, 0)}"
+    way = f"past the zenith {begin}: at most {crossing.largest_error_deg:.2f} deg off"
+    if crossing.lost_from_tai_s is None:
+        return f"{way}, within the beam"
+    return f"{way}, out of the beam for {crossing.lost_s:.1f} s from {utc_text(crossing.lost_from_tai_s, 0)} on"
 
 
 def out_of_reach(

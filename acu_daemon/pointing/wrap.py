@@ -74,6 +74,11 @@ def _other_way(az_deg: Array, el_deg: Array) -> Array:
     return np.where(is_after, az_deg - full_turn, az_deg)[is_low]
 
 
+def judged(offset_deg: float, path_az_deg: Array, path_el_deg: Array, limits: AxisLimits) -> Turn:
+    """What a turn holds of a path; arguments as those of choose_turn."""
+    return _judge(offset_deg, path_az_deg, _other_way(path_az_deg, path_el_deg), limits)
+
+
 def _judge(offset_deg: float, az_deg: Array, other_az_deg: Array, limits: AxisLimits) -> Turn:
     inside = (az_deg + offset_deg >= limits.min_deg) & (az_deg + offset_deg <= limits.max_deg)
     other = other_az_deg + offset_deg

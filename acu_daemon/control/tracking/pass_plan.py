@@ -1,21 +1,26 @@
 """The plan of a pass: where to stand, on which turn of the wrap, when it is due, and when the pass ends.  Pure."""
 
+from functools import partial
 from math import isfinite
 
 import numpy as np
 
 from acu_daemon.assist.mount_model import encoder_look
+from acu_daemon.assist.session.prediction import predict
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick_input import PassPlan, Sky
-from acu_daemon.control.tracking.approach import ACQUIRE_LEAD_S
+from acu_daemon.control.tracking.approach import ACQUIRE_LEAD_S, way_s
 from acu_daemon.control.tracking.state_table import AUTOTRACKING
-from acu_daemon.model import AxisLimits, Pass, Site
+from acu_daemon.model import AxisLimits, Pass, Site, ZenithCrossing
 from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.pointing.keyhole import KeyholeRules, longest_window_s
 from acu_daemon.pointing.reach import OutOfReach, out_of_reach
-from acu_daemon.pointing.wrap import choose_turn, middle_deg
+from acu_daemon.pointing.turn_plan import TurnAsk, plan_turns
+from acu_daemon.pointing.wrap import choose_turn, judged, middle_deg
 
 COARSE_STEP_S, MOST_STEPS = 0.5, 20000  # of these a tenth of a second's work, in the loop
 ANY_ELEVATION = AxisLimits(-90.0, 180.0, 1.0, 1.0)
+LEAST_KEYHOLE_EL_DEG, MOST_AROUND_S = 60.0, 400.0  # lower, and slower, no drive crosses the zenith in a window
 STEP_S = 0.25  # fine enough to unwrap the azimuth of a pass 0.1 deg from the zenith
 
 
@@ -29,18 +34,30 @@ def plan_pass(
     *,
     elevation: AxisLimits = ANY_ELEVATION,
     learned_count: int = 0,
+    keyhole: KeyholeRules | None = None,
 ) -> PassPlan:
-    """Choose the turn that holds what is left of the pass, and the point where the antenna waits for it.
+    """Choose the turns that cost least of what is left of the pass, and the point where the antenna waits for it.
 
     present_az_deg: where the antenna stands, continuous azimuth in the encoder frame.
-    learned_count: turns of the azimuth that were learned so far.
+    learned_count: turns of the azimuth that were learned so far.  keyhole: what the antenna can do near the zenith;
+    then the plan says what that costs.
     """
     start_tai_s = min(max(coming.rise_tai_s, now_tai_s), coming.set_tai_s - 1.0)
     step_s = max(STEP_S, (coming.set_tai_s - start_tai_s) / MOST_STEPS)  # one that does not set lasts for days
     tai_s = np.arange(start_tai_s, coming.set_tai_s + step_s, step_s)
     look = encoder_look(propagator, tai_s, site, None)
     az_deg = np.degrees(np.unwrap(np.radians(look.az_deg)))
-    turn = choose_turn(az_deg, look.el_deg, azimuth, present_az_deg)
+    is_seen = np.ones(tai_s.size, dtype=np.bool_)
+    for from_tai_s, to_tai_s in coming.hidden_tai_s:
+        is_seen &= (tai_s < from_tai_s) | (tai_s > to_tai_s)
+    turns = plan_turns(
+        TurnAsk(
+            *(tai_s, az_deg, is_seen, azimuth, present_az_deg, now_tai_s),
+            way_s=partial(way_s, axis=azimuth),
+            is_either_way=lambda offset_deg: judged(offset_deg, az_deg, look.el_deg, azimuth).holds_either_way,
+        )
+    )
+    turn = judged(turns.offset_deg, az_deg, look.el_deg, azimuth)
     return PassPlan(
         rise_tai_s=coming.rise_tai_s,
         set_tai_s=coming.set_tai_s,
@@ -51,7 +68,25 @@ def plan_pass(
         beyond=out_of_reach(tai_s, az_deg + turn.offset_deg, look.el_deg, azimuth, elevation),
         learned_count=learned_count,
         hidden_tai_s=coming.hidden_tai_s,
+        unwindings=turns.unwindings,
+        crossing=_crossing(propagator, site, coming, start_tai_s, keyhole),
     )
+
+
+def _crossing(
+    propagator: Propagator, site: Site, coming: Pass, start_tai_s: float, keyhole: KeyholeRules | None
+) -> ZenithCrossing | None:
+    """How the zenith will be crossed, by the elements; None where the drive can follow, or it is past."""
+    if keyhole is None or coming.culmination_el_deg < LEAST_KEYHOLE_EL_DEG:
+        return None
+    around_s = 2.0 * longest_window_s(keyhole.azimuth)
+    first_tai_s = coming.culmination_tai_s - around_s
+    if coming.culmination_tai_s < start_tai_s or around_s > MOST_AROUND_S:
+        return None
+    buffer = predict(
+        *(propagator, site, first_tai_s, first_tai_s, "TLE", 0.0), horizon_s=2.0 * around_s, keyhole=keyhole
+    )
+    return buffer.crossing
 
 
 def beyond_limits(
