@@ -3,6 +3,7 @@
 
     .venv/bin/python scripts/reproduce_seed001.py               tables on standard output
     .venv/bin/python scripts/reproduce_seed001.py --plots DIR   figures 2.1 and 2.2, and the sensitivity of 2.4.3
+    .venv/bin/python scripts/reproduce_seed001.py --air         losses with `full` alone, in air
 
 Losses at every elevation of 32 passes (highest elevations from 10 to 89.9 degrees, four directions of the perigee).
 Errors are angles on the sky.  It needs brahe: pip install -c constraints.txt '.[accuracy]'
@@ -17,7 +18,7 @@ from importlib.util import find_spec
 import numpy as np
 from tables.charts_seed_001 import plot_losses, plot_sensitivity
 from tables.console import progress, say
-from tables.landsat import PERIGEES_DEG, LandsatPass, landsat_passes
+from tables.landsat import PERIGEES_DEG, LandsatPass, in_air, landsat_passes
 from tables.outputs import output_folder
 from tables.seed_001 import (
     A_ERRORS_KM,
@@ -59,10 +60,12 @@ def _try_one(step_s: int, job: tuple[Experiment, LandsatPass, int]) -> list[Loss
     return loss_trials(one, experiment, step_s, np.random.default_rng((SEED, number)))
 
 
-def losses(passes: list[LandsatPass]) -> dict[str, list[LossTrial]]:
+def losses(
+    passes: list[LandsatPass], experiments: Sequence[Experiment] = EXPERIMENTS, step_s: int = LOSS_STEP_S
+) -> dict[str, list[LossTrial]]:
     """2.4.1: print the table, and give the losses."""
     say("losses at every elevation")
-    found = try_all(passes, EXPERIMENTS, LOSS_STEP_S)
+    found = try_all(passes, experiments, step_s)
     names = (
         "method",
         f"s until {LIMIT_DEG:g}°, shortest",
@@ -72,7 +75,7 @@ def losses(passes: list[LandsatPass]) -> dict[str, list[LossTrial]]:
         f"losses that leave {LIMIT_DEG:g}°",
     )
     print("| " + " | ".join(names) + " |\n" + "|---" * len(names) + "|")
-    for experiment, trials in zip(EXPERIMENTS, found, strict=True):
+    for experiment, trials in zip(experiments, found, strict=True):
         one = verdict(trials)
         cells = (
             experiment.name,
@@ -83,8 +86,8 @@ def losses(passes: list[LandsatPass]) -> dict[str, list[LossTrial]]:
             f"{one.beyond_count} of {one.trial_count}",
         )
         print("| " + " | ".join(cells) + " |")
-    _print_where(dict(zip((one.name for one in EXPERIMENTS), found, strict=True)))
-    return {experiment.name: trials for experiment, trials in zip(EXPERIMENTS, found, strict=True)}
+    _print_where(dict(zip((one.name for one in experiments), found, strict=True)))
+    return {experiment.name: trials for experiment, trials in zip(experiments, found, strict=True)}
 
 
 def _print_where(trials: dict[str, list[LossTrial]]) -> None:
@@ -118,6 +121,8 @@ def _seconds(value: float) -> str:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--air", action="store_true", help="losses with `full` alone, in air")
+    parser.add_argument("--step", type=int, default=LOSS_STEP_S, metavar="S", help="s between losses (%(default)s)")
     parser.add_argument("--plots", type=output_folder, metavar="DIR", help="draw the figures there")
     chosen = parser.parse_args()
     if find_spec("brahe") is None:
@@ -125,7 +130,11 @@ def main() -> int:
         return 2
     say("integrating the orbit and placing the stations")
     passes = landsat_passes()
-    found = losses(passes)
+    if chosen.air:
+        of_full = [one for one in EXPERIMENTS if one.estimator == "full"]
+        losses([in_air(one, seed) for seed, one in enumerate(passes)], of_full, chosen.step)
+        return 0
+    found = losses(passes, step_s=chosen.step)
     perigees = len(passes) // len(PERIGEES_DEG)
     worst = sensitivity(passes[:perigees] + passes[2 * perigees : 3 * perigees])
     if chosen.plots:

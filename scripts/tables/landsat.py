@@ -3,7 +3,7 @@
 The station has Cuiabá's latitude; its longitude is put where the pass gets the wanted highest elevation.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import degrees, radians
 
 import numpy as np
@@ -11,10 +11,14 @@ import numpy as np
 from acu_daemon.model import Site, Station
 from acu_daemon.orbit.brouwer import BrouwerElements, BrouwerPropagator
 from acu_daemon.orbit.frames import itrs_from_teme
-from acu_daemon.orbit.look import look_at
+from acu_daemon.orbit.look import Look, look_at
 from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.timescales import tai_from_utc
+from acu_daemon.pointing.air import standard_air
+from acu_daemon.sim.apparent_sky import make_air
+from acu_daemon.sim.shell_air import SimulatedAir
 from acu_daemon.units import Array
+from tables.air import DRAWN, told_air
 from tables.errors_put_in import turned_to_mean
 from tables.reference_orbit import TabulatedOrbit, integrate_state
 from tables.seed_figures import EXACT, MIN_ELEVATION_DEG
@@ -39,6 +43,22 @@ class LandsatPass:
     orbit: TabulatedOrbit
     mean: BrouwerElements
     culmination_deg: float
+    air: SimulatedAir | None = None  # None: a vacuum, as the paper's
+
+    def apparent_el_deg(self, look: Look) -> Array:
+        """Where what lies at geometric directions is seen, (N,)."""
+        if self.air is None:
+            return look.el_deg
+        seen = zip(look.el_deg.tolist(), look.range_m.tolist(), strict=True)
+        return np.array([self.air.apparent_el_deg(*one) for one in seen])
+
+
+def in_air(one: LandsatPass, seed: int) -> LandsatPass:
+    """The pass seen through air within 10 % of the standard air that the site is told."""
+    station = one.site.station
+    air = make_air(standard_air(station), DRAWN, station.height_m, seed)
+    there = replace(one, site=told_air(one.site), air=air)
+    return replace(there, el_deg=there.apparent_el_deg(look_at(one.orbit, one.tai_s, one.site)))
 
 
 def landsat_passes(

@@ -11,6 +11,7 @@ from acu_daemon.model import Readings
 from acu_daemon.orbit.brouwer import BrouwerElements, BrouwerPropagator
 from acu_daemon.orbit.look import look_at
 from acu_daemon.units import DEG, Array
+from tables.air import with_scale
 from tables.landsat import LandsatPass
 
 LIMIT_DEG = 0.1  # Aguirre and Medeiros 1988, 2.4.1
@@ -99,7 +100,8 @@ def loss_trials(a_pass: LandsatPass, experiment: Experiment, step_s: int, rng: n
     trials = []
     for k in range(int(np.ceil(experiment.lock_s)), a_pass.tai_s.size - 1, step_s):
         loss_tai_s = float(a_pass.tai_s[k])
-        estimator = make_estimator(experiment.estimator, source, a_pass.site, experiment.settings)
+        settings = with_scale(experiment.settings, a_pass.site)
+        estimator = make_estimator(experiment.estimator, source, a_pass.site, settings)
         estimator.add(_readings(a_pass, experiment, loss_tai_s, rng))
         fit = estimator.fit()
         corrected = source if fit is None else source.corrected(fit.correction)
@@ -131,7 +133,7 @@ def _readings(a_pass: LandsatPass, experiment: Experiment, end_tai_s: float, rng
     seen = look_at(a_pass.orbit, tai_s, a_pass.site)
     across, upward = experiment.noise_deg * rng.standard_normal((2, count))
     az_deg = (seen.az_deg + across / np.cos(np.radians(seen.el_deg))) % 360.0
-    return Readings(tai_s, az_deg, seen.el_deg + upward)
+    return Readings(tai_s, az_deg, a_pass.apparent_el_deg(seen) + upward)
 
 
 def sky_angles_deg(az1_deg: Array, el1_deg: Array, az2_deg: Array, el2_deg: Array) -> Array:
