@@ -8,8 +8,9 @@ the same with 11 km; Smith and Weintraub 1953, N = 77.6 / T (P + 4810 e / T); Te
 P.453's exponential of 7.35 km as the other profile.
 """
 
+from bisect import bisect_left
 from dataclasses import dataclass
-from math import exp
+from math import atan2, degrees, exp, sqrt
 from typing import Literal
 
 import numpy as np
@@ -24,29 +25,43 @@ _SCALE_HEIGHT_M, _EXPONENTIAL_TOP_M = 7350.0, 150e3
 _APPARENT_DEG = np.concatenate([np.arange(0.0, 5.0, 0.05), np.arange(5.0, 20.0, 0.1), np.arange(20.0, 90.1, 0.5)])
 
 
+@dataclass(frozen=True, slots=True)
+class _Ray:
+    """Where a ray leaves the air, horizontally and vertically from the antenna, and the way on, (along, across)."""
+
+    apparent_deg: float
+    x_m: float
+    y_m: float
+    along: float
+    across: float
+
+    def geometric_deg(self, range_m: float) -> float:
+        """The elevation in a vacuum of what is met at a distance."""
+        passed_m = self.x_m * self.along + self.y_m * self.across
+        aside2 = self.x_m**2 + self.y_m**2 - passed_m**2
+        further_m = sqrt(max(range_m, 2e5) ** 2 - aside2) - passed_m
+        return degrees(atan2(self.y_m + further_m * self.across, self.x_m + further_m * self.along))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedAir:
-    """Rays of a set of apparent elevations, where they leave the air: made by `simulated_air`.
+    """Rays of a set of apparent elevations, the lowest first, the last to the zenith: made by `simulated_air`."""
 
-    x_m, y_m: horizontally and vertically from the antenna; out_rad: elevation of the way on, at the antenna's horizon.
-    """
-
-    x_m: Array
-    y_m: Array
-    out_rad: Array
+    rays: tuple[_Ray, ...]
 
     def apparent_el_deg(self, geometric_el_deg: float, range_m: float) -> float:
         """Give the elevation at which a satellite appears, from that in a vacuum, 0.0001 deg.
 
         Below the lowest ray, which leaves horizontally, the refraction is that of the lowest ray.
         """
-        along, across = np.cos(self.out_rad), np.sin(self.out_rad)
-        passed_m = self.x_m * along + self.y_m * across
-        aside2 = self.x_m**2 + self.y_m**2 - passed_m**2
-        further_m = np.sqrt(np.maximum(range_m, 2e5) ** 2 - aside2) - passed_m
-        geometric = np.degrees(np.arctan2(self.y_m + further_m * across, self.x_m + further_m * along))
-        geometric[-1] = 90.0
-        return geometric_el_deg + float(np.interp(geometric_el_deg, geometric, _APPARENT_DEG - geometric))
+        above = bisect_left(self.rays, geometric_el_deg, key=lambda ray: ray.geometric_deg(range_m))
+        if above == len(self.rays):  # the zenith
+            return geometric_el_deg
+        high, low = self.rays[above], self.rays[max(above - 1, 0)]
+        high_deg, low_deg = high.geometric_deg(range_m), low.geometric_deg(range_m)
+        high_up_deg, low_up_deg = high.apparent_deg - high_deg, low.apparent_deg - low_deg
+        share = 0.0 if above == 0 else (geometric_el_deg - low_deg) / (high_deg - low_deg)
+        return geometric_el_deg + low_up_deg + share * (high_up_deg - low_up_deg)
 
 
 def simulated_air(
@@ -77,4 +92,6 @@ def simulated_air(
     for n, low_m, high_m in zip(indices, radii_m, radii_m[1:], strict=False):
         central += np.arccos(invariant / (n * high_m)) - np.arccos(np.minimum(invariant / (n * low_m), 1.0))
     x_m, y_m = radii_m[-1] * np.sin(central), radii_m[-1] * np.cos(central) - radii_m[0]
-    return SimulatedAir(x_m, y_m, np.arccos(invariant / radii_m[-1]) - central)
+    out_rad = np.arccos(invariant / radii_m[-1]) - central
+    columns = (_APPARENT_DEG, x_m, y_m, np.cos(out_rad), np.sin(out_rad))
+    return SimulatedAir(tuple(_Ray(*ray) for ray in zip(*(one.tolist() for one in columns), strict=True)))
