@@ -403,13 +403,8 @@ def main() -> int:
     parser.set_defaults(air="told")
     parser.add_argument("--json", type=output_file, help="write the figures here")
     chosen = parser.parse_args()
-    jobs = [
-        (name, case, chosen.air)
-        for name in pass_names()
-        if chosen.only in name
-        for case in CASES
-        if case.startswith(chosen.case)
-    ]
+    cases = [case for case in CASES if case.startswith(chosen.case)]
+    jobs = [(name, case, chosen.air) for name in pass_names() if chosen.only in name for case in cases]
     if not jobs:
         sys.exit("no real passes: ../shared/data/passes is not there, or --only fits none")
     rows = results_of(run_campaign(fly_real, jobs, name_of=lambda job: f"{job[0]}, {job[1]}", on_done=progress))
@@ -422,7 +417,7 @@ def main() -> int:
         )
         for note in row.notes:
             print(f"    note: {note}")
-    for case in (case for case in CASES if case.startswith(chosen.case)):
+    for case in cases:
         worst = [row.worst_deg for row in rows if row.case == case]
         noted = sum(bool(row.notes) for row in rows if row.case == case)
         print(f"{case:17} worst {max(worst):.4f}, median {np.median(worst):.4f}; passes with a note: {noted}")
