@@ -8,6 +8,8 @@ import sys
 def main() -> None:
     """Run the command line.  A Ctrl-C ends it without a traceback from the first moment on."""
     try:
+        if "--events" in sys.argv:  # the daemon's own fetcher: before it loads anything, the ticks go first
+            os.nice(19)
         gc.disable()  # what is loaded is no garbage, and looking for some takes a fifth of the start
         keep_out_the_working_directory()  # before anything more is loaded: it might be found there
         from acu_daemon.edge.denied import denied

@@ -2,7 +2,6 @@
 
 import asyncio
 import json
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -67,7 +66,8 @@ def show(config: Config, state: State = None) -> None:
 def fetch(
     config: Config,
     events: Annotated[
-        bool, typer.Option("--events", help="Print events as lines of JSON, for the daemon; and be nice to it.")
+        bool,
+        typer.Option("--events", help="Print events as JSON lines, for the daemon; leave the processor to it."),
     ] = False,
 ) -> None:
     """Ask the sources that are due, and keep what is better than what is there.
@@ -79,8 +79,6 @@ def fetch(
 
     Exit status: 0, also where nothing was due; 1 where a source has stopped or an answer could not be used.
     """
-    if events:
-        os.nice(19 - os.nice(0))
     section = load_station(config).elements
     if not section.urls:
         raise UsageError(f"{config / 'station.toml'}: [elements] source names no URL: there is nothing to fetch")

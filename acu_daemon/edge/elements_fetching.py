@@ -17,7 +17,7 @@ from acu_daemon.edge.fetch_policy import FIRST_PAUSE_S, HOUR_S, LONGEST_PAUSE_S,
 from acu_daemon.edge.fetch_state_file import read_fetch_state
 
 LOOK_S = 60.0
-LONGEST_S = 900.0  # of a process that fetches
+LONGEST_S = 1800.0  # of a process that fetches
 MOST_LINES = 200
 
 
