@@ -280,6 +280,15 @@ def test_a_state_that_is_damaged_stops_rather_than_storms(tmp_path: Path) -> Non
         assert not is_due(state, 1e12, EVERY_S)
 
 
+async def test_however_much_there_is_to_say_the_state_can_be_read_again(tmp_path: Path) -> None:
+    async def talks(state: FetchState) -> tuple[FetchOutcome, bytes]:
+        return FetchOutcome(Came.FAILED, "é" * 100_000), b""
+
+    await fetch(tmp_path, "http://x/", Time(), talks)
+    state = read_fetch_state(tmp_path, "http://x/")
+    assert (state.stopped, len(state.problem)) == ("", 2000)
+
+
 def test_only_one_fetches_at_a_time(tmp_path: Path) -> None:
     with one_at_a_time(tmp_path) as first, one_at_a_time(tmp_path) as second:
         assert (first, second) == (True, False)

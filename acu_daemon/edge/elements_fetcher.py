@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 
 from acu_daemon.edge.elements_store import KeptSet, WantedSatellite, keep_set
 from acu_daemon.edge.fetch_policy import Came, FetchOutcome, FetchState, after, before_asking, is_due, is_news
-from acu_daemon.edge.fetch_state_file import group_file, read_fetch_state, write_fetch_state
+from acu_daemon.edge.fetch_state_file import LONGEST_TEXT, group_file, read_fetch_state, write_fetch_state
 from acu_daemon.edge.orbit_file import EPHEMERIS_PARSERS, GZIP, SET_PARSERS, contents_of
 from acu_daemon.edge.writer import replace_file
 from acu_daemon.errors import ElementsError
@@ -91,9 +91,11 @@ async def _fetch(
     kept: list[KeptSet] = []
     if outcome.came is Came.GOOD:
         outcome, kept = await asyncio.to_thread(_accepted, store, before.url, outcome, data, satellites, clock_tai_s())
+    outcome = replace(outcome, reason=outcome.reason[:LONGEST_TEXT])
     later = after(before, outcome, clock_tai_s(), every_s)
     if outcome.came is Came.GOOD:
-        later = replace(later, not_taken="; ".join(f"{one.satellite.name}: {one.reason}" for one in kept if one.reason))
+        not_taken = "; ".join(f"{one.satellite.name}: {one.reason}" for one in kept if one.reason)
+        later = replace(later, not_taken=not_taken[:LONGEST_TEXT])
     write_fetch_state(store, later)
     told = [_told_of(before.url, outcome, later, kept)] if is_news(before, later, outcome) else []
     if later.not_taken and later.not_taken != before.not_taken:

@@ -12,8 +12,8 @@ from acu_daemon.edge.writer import replace_file
 from acu_daemon.orbit.timescales import utc_text
 
 VERSION = 1
-_LARGEST_BYTES = 20_000
-_LONGEST_TEXT = 5000
+LONGEST_TEXT = 2000  # of a reason, so that the file stays small
+_LARGEST_BYTES = 100_000
 _TIMES = ("asked", "next", "good")
 
 
@@ -62,7 +62,7 @@ def _from_json(read: Any, url: str) -> FetchState:
         kind: type = type(one.default)
         if kind is float and isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
             values[one.name] = float(value)
-        elif type(value) is kind and len(str(value)) <= _LONGEST_TEXT:
+        elif type(value) is kind and len(str(value)) <= LONGEST_TEXT:
             values[one.name] = value
         else:
             raise ValueError(f"{one.name} is {str(value)[:40]!r}")
