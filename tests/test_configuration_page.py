@@ -27,7 +27,7 @@ from acu_daemon.config.satellite_tables import BrouwerSection, ElementsFileSecti
 from acu_daemon.config.schedule_tables import MaintenanceSection
 from acu_daemon.config.section import Section
 from acu_daemon.config.station_tables import SafetySection, StationFile, TimeSection
-from acu_daemon.config.tracking_tables import TrackingSection
+from acu_daemon.config.tracking_tables import ReceiverSection, TrackingSection
 
 writer = load("write_configuration")
 ROOT = Path(__file__).resolve().parents[1]
@@ -92,6 +92,7 @@ OUT_OF_SAID: dict[str, tuple[type[Section], dict[str, Any]]] = {  # ranges that 
     "ElementsSourcesSection.store": (ElementsSourcesSection, {"store": ""}),
     "ElementsSourcesSection.login": (ElementsSourcesSection, {"login": ""}),
     "ElementsSourcesSection.ca_file": (ElementsSourcesSection, {"ca_file": ""}),
+    "ReceiverSection.signal": (ReceiverSection, {"signal": "udp"}),
     "SafetySection.register_watchdog_s": (SafetySection, {"register_watchdog_s": 1.9}),
     "SafetySection.following_error_s": (SafetySection, {"following_error_s": 0.4}),
     "AtmosphereSection.pressure_hpa": (

@@ -100,9 +100,25 @@ class Done:
 
 @dataclass(frozen=True, slots=True)
 class Refused:
-    """Not done, and nothing changed.  why: in words, where the ACU gives a reason."""
+    """Not done, and nothing changed.  why: in words, where the ACU gives a reason.
+
+    has_no_contact: what answers does not reach the antenna, so that this counts as silence.
+    """
 
     why: str = ""
+    has_no_contact: bool = False
+
+
+def beyond_own_limits(identity: AcuIdentity, azimuth: AxisLimits, elevation: AxisLimits) -> str:
+    """What of the configured limits the ACU does not reach, and what to do; empty: nothing, or it does not say."""
+    told = []
+    for name, ours, own in (("azimuth", azimuth, identity.azimuth), ("elevation", elevation, identity.elevation)):
+        if own is not None and not own.min_deg <= ours.min_deg <= ours.max_deg <= own.max_deg:
+            told.append(
+                f"[acu.{name}] is {ours.min_deg:g} to {ours.max_deg:g} deg, the ACU goes from {own.min_deg:g} to "
+                f"{own.max_deg:g} deg: set min_deg and max_deg within that"
+            )
+    return "; ".join(told)
 
 
 Reply = AcuStatus | Commanded | AcuIdentity | FaultReport | TurnChoice | WatchdogTime | Done | Refused

@@ -167,7 +167,8 @@ def command(
         structlog.get_logger("run").info("run.done", **asdict(outcome))
     if not outcome.is_stopped:
         raise typer.Exit(1)
-    if outcome.has_begun and not outcome.has_acquired and outcome.reason not in {number.name for number in STOPS}:
+    is_missed = first.job.control.has_signal and not outcome.has_acquired
+    if outcome.has_begun and is_missed and outcome.reason not in {number.name for number in STOPS}:
         raise typer.Exit(1)
 
 

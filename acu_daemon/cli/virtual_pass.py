@@ -142,13 +142,13 @@ def fly(
         flight.outcome = await service.run()
         acu.advance(clock.tai_s())
 
-    with _events_to(flight.events):
+    with events_to(flight.events):
         run_virtual(main())
     return flight
 
 
 @contextmanager
-def _events_to(events: list[dict[str, Any]]) -> Iterator[None]:
+def events_to(events: list[dict[str, Any]]) -> Iterator[None]:
     """Gather the log in place of printing it."""
     before = structlog.get_config()
 

@@ -4,7 +4,9 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
+from acu_daemon.acu.driver import AcuDriver
 from acu_daemon.config.section import Section
+from acu_daemon.drivers.dialects import DriverSettings, make_driver
 from acu_daemon.drivers.sa3842.codec import address_byte
 from acu_daemon.edge.link import make_link
 from acu_daemon.errors import UsageError
@@ -86,15 +88,27 @@ class AcuSection(Section):
     )
     azimuth: AxisSection = Field(description="Limits of the azimuth axis and its drive.")
     elevation: ElevationSection = Field(description="Limits of the elevation axis and its drive.")
-    dialect: Literal["sa3842"] = Field(
+    dialect: Literal["sa3842", "rotctl"] = Field(
         default="sa3842",
-        description="The wire protocol (docs/protocol.md).  Decides which codec is used; there is one.",
+        description=(
+            "What the ACU speaks: `sa3842` (docs/protocol.md), or `rotctl`, a Hamlib rotator behind rotctld "
+            "(docs/rotators.md).  Decides which driver is used, and with it what the antenna can do."
+        ),
     )
     address: Annotated[str, BeforeValidator(_address)] = Field(
         default="1",
         json_schema_extra={"range": "`1` to `o`"},
         description=(
             "The ACU's address on the line, one character.  Decides which ACU answers where several share a line."
+        ),
+    )
+    dead_band_deg: float = Field(
+        default=0.5,
+        ge=0.05,
+        le=10,
+        description=(
+            "Of a rotator (`rotctl`): it is sent to another angle only when that differs by more from the last one.  "
+            "Decides how often relays switch, and how near to the path the antenna is."
         ),
     )
     period_s: float = Field(
@@ -115,3 +129,16 @@ class AcuSection(Section):
             "which moment commands are computed."
         ),
     )
+
+    @model_validator(mode="after")
+    def _is_of_its_dialect(self) -> "AcuSection":
+        if self.dialect == "rotctl" and not self.url.startswith("tcp:"):
+            expected = 'expected url = "tcp://HOST:4533", where rotctld is'
+            raise ValueError(f'dialect = "rotctl": {expected}, not {self.url!r}')
+        if self.dialect != "rotctl" and "dead_band_deg" in self.model_fields_set:
+            raise ValueError(f'dead_band_deg: dialect = "{self.dialect}" has none, leave it out')
+        return self
+
+    def driver(self) -> AcuDriver:
+        """The driver of this ACU, at the beginning of its dialogue."""
+        return make_driver(self.dialect, DriverSettings(self.address, self.device_delay_s, self.dead_band_deg))

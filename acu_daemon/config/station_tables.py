@@ -199,6 +199,28 @@ class StationFile(Section):
         self.atmosphere.check(Station(s.name, s.latitude_deg, s.longitude_deg, s.height_m))
         return self
 
+    @model_validator(mode="after")
+    def _is_what_the_acu_can_do(self) -> "StationFile":
+        acu = self.acu.driver().capabilities
+        if self.receiver.signal == "acu" and not acu.has_autotrack:
+            raise ValueError(
+                f'receiver.signal = "acu": an ACU with dialect = "{self.acu.dialect}" has no autotrack and tells of no '
+                'signal; leave it out, or say signal = "none" (program track)'
+            )
+        error_deg = self.safety.following_error_deg
+        if self.safety.following_error_s and acu.dead_band_deg > error_deg / 2:
+            raise ValueError(
+                f"acu.dead_band_deg = {acu.dead_band_deg:g}: expected at most half of safety.following_error_deg = "
+                f"{error_deg:g}, or an antenna that waits within it would be latched; raise following_error_deg"
+            )
+        return self
+
+    @property
+    def has_signal(self) -> bool:
+        """Whether a pass is tracked by its signal; else it is flown by program track."""
+        signal = self.receiver.signal
+        return self.acu.driver().capabilities.has_autotrack if signal is None else signal == "acu"
+
     @property
     def site(self) -> Site:
         s = self.station

@@ -9,12 +9,11 @@ from acu_daemon.config.satellite_tables import SatelliteFile, UncertaintySection
 from acu_daemon.config.station_tables import StationFile
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.axis_watch import Bounds
-from acu_daemon.drivers.dialects import DriverSettings, make_driver
 
 
 def driver_of(station: StationFile) -> AcuDriver:
     """The driver of the station's ACU, at the beginning of its dialogue."""
-    return make_driver(station.acu.dialect, DriverSettings(station.acu.address, station.acu.device_delay_s))
+    return station.acu.driver()
 
 
 def control_config(
@@ -42,6 +41,7 @@ def control_config(
         register_watchdog_s=station.safety.register_watchdog_s if driver.capabilities.has_register_watchdog else 0.0,
         acu=driver.capabilities,
         response_time_s=station.envelope.response_time_s,
+        has_signal=station.has_signal,
         clock_alarm_deg=station.safety.clock_alarm_beam_fraction * station.receiver.beamwidth_deg,
         following=Bounds(station.safety.following_error_deg, station.safety.following_error_s),
     )

@@ -28,6 +28,14 @@ class ReceiverSection(Section):
             "and what a glimpse of signal is worth."
         ),
     )
+    signal: Literal["acu", "none"] | None = Field(
+        default=None,
+        json_schema_extra={"range": "`acu`, `none`"},
+        description=(
+            "Who says that the signal is there: the ACU, which follows it (autotrack), or nobody.  Decides whether a "
+            "pass is tracked by its signal or flown by program track.  Left out: `acu` where the ACU has autotrack."
+        ),
+    )
 
 
 class ReadingsSection(Section):

@@ -38,6 +38,7 @@ class ControlConfig:
     following: Bounds = Bounds()
     acu: Capabilities = Capabilities()
     response_time_s: float = 60.0  # an antenna that may not be moved, and that the sun reaches within it, is an alarm
+    has_signal: bool = True  # autotrack gives one; else a pass is flown by program track
     clock_alarm_deg: float = 0.1  # an error of UTC counts from here on, at the sky's present rate
 
     @property

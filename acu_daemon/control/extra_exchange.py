@@ -33,7 +33,7 @@ def wanted_extra(state: ControlState, now_tai_s: float, config: ControlConfig) -
     wanted = wanted or question(state) or next_command(state, config)
     may_select = state.is_armed(config) and not state.turn.is_stopping
     if wanted is None and may_select and _are_registers_fresh(state, now_tai_s, config):
-        wanted = wanted_mode_command(state, is_settled=now_tai_s - asked.again_tai_s > EXTRA_SETTLED_S)
+        wanted = wanted_mode_command(state, config, is_settled=now_tai_s - asked.again_tai_s > EXTRA_SETTLED_S)
     if wanted is None or (wanted == asked.command and now_tai_s < asked.again_tai_s):
         return None
     return wanted

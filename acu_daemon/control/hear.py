@@ -59,7 +59,8 @@ def _hear_status(
     fitting, is_locked = _dwelt(state.fitting, reading, config)
     if is_locked and not arrival.is_sure:
         fitting = replace(fitting, out_of_step_count=fitting.out_of_step_count + 1)
-    is_to_fit = is_locked and arrival.is_sure and state.tracking.track in AUTOTRACKING and not state.encoders.problem
+    is_tracked = config.acu.has_autotrack and state.tracking.track in AUTOTRACKING
+    is_to_fit = is_locked and arrival.is_sure and is_tracked and not state.encoders.problem
     return with_parts(state, plausibility=plausibility, fitting=fitting), Heard(seen, reading, is_to_fit)
 
 

@@ -104,7 +104,7 @@ def write(
     registers, status = state.registers, state.intake.status
     is_followed = status is not None and status.follows_registers
     dt_s = now_tai_s - registers.last_write_tai_s if registers.last_write_tai_s is not None else config.period_s
-    dt_s = min(max(dt_s, config.period_s / 2), 3 * config.period_s)
+    dt_s = min(max(dt_s, config.period_s / 2), max(3 * config.period_s, config.acu.reply_deadline_s))
     passed = limit(wanted, state, now_tai_s, is_followed=is_followed, dt_s=dt_s, config=config)
     state = _tell(state, passed, wanted, now_tai_s, events, is_followed=is_followed)
     has_goal = is_followed and wanted.is_finite

@@ -38,21 +38,31 @@ WATCHDOG_TRY_S = 2.0  # without the answer that is hoped for, and the ACU counts
 def next_command(state: ControlState, config: ControlConfig) -> Command | None:
     """The exchange that brings the start one step further; None when it waits or is done."""
     startup, status, asked = state.startup, state.intake.status, state.asked.command
-    if startup.stage is StartStage.NEW:
+    stage = reached(startup.stage, config)
+    if stage is StartStage.NEW:
         return Identify()
-    if startup.stage is StartStage.IDENTIFIED:
+    if stage is StartStage.IDENTIFIED:
         return ReadCommanded()
     if state.latch.problem or not state.is_armed(config) or status is None or not status.is_remote_enabled:
         return None
-    if startup.stage is StartStage.REGISTERS_KNOWN:
+    if stage is StartStage.REGISTERS_KNOWN:
         return FreeTurnChoice() if asked == ReadTurnChoice() else ReadTurnChoice()
-    if startup.stage is StartStage.SECTOR_FREE:
+    if stage is StartStage.SECTOR_FREE:
         return PointAt(*_present(state, config)) if state.intake.is_place_sure else None
-    if startup.stage is StartStage.PRESENT_WRITTEN:
+    if stage is StartStage.PRESENT_WRITTEN:
         return ReadCommanded()
     if config.register_watchdog_s > 0.0 and startup.watchdog is Watchdog.UNKNOWN:
         return SetWatchdog(config.register_watchdog_s) if asked == ReadWatchdog() else ReadWatchdog()
     return None
+
+
+def reached(stage: StartStage, config: ControlConfig) -> StartStage:
+    """The stage from which the start goes on: what the ACU has not is left out."""
+    if stage is StartStage.IDENTIFIED and not config.acu.has_read_back:
+        stage = StartStage.REGISTERS_KNOWN
+    if stage is StartStage.REGISTERS_KNOWN and not config.acu.has_turn_choice:
+        return StartStage.SECTOR_FREE
+    return StartStage.READY if stage is StartStage.PRESENT_WRITTEN and not config.acu.has_read_back else stage
 
 
 def begin_again(state: ControlState, *, keeps_watchdog: bool) -> ControlState:
@@ -110,7 +120,7 @@ def after_reply(
     is_refused = (
         isinstance(reply, Refused) and state.intake.status is not None and state.intake.status.is_remote_enabled
     )
-    match (startup.stage, command, reply):
+    match (reached(startup.stage, config), command, reply):
         case (_, Stop(), Done()):
             startup = replace(startup, watchdog=_perhaps_set(startup, config))
         case (_, ReadWatchdog() | SetWatchdog(), _):
@@ -132,7 +142,8 @@ def after_reply(
             events.append(Event("acu.sector_refused", {"advice": advice}, is_warning=True))
             startup = replace(startup, stage=StartStage.SECTOR_FREE)
         case (StartStage.SECTOR_FREE, PointAt() as written, Done()):
-            startup = replace(startup, stage=StartStage.PRESENT_WRITTEN, present_deg=(written.az_deg, written.el_deg))
+            stage = reached(StartStage.PRESENT_WRITTEN, config)
+            startup = replace(startup, stage=stage, present_deg=(written.az_deg, written.el_deg))
         case (StartStage.PRESENT_WRITTEN, ReadCommanded(), Commanded() as read):
             startup = replace(
                 startup, stage=StartStage.READY if _matches(startup, read, config) else StartStage.SECTOR_FREE

@@ -103,7 +103,8 @@ class Foreground:
             missed = max(0, math.floor((self._clock.tai_s() - due_tai_s) / period_s))
             if round(late_s, 3) > (missed + LATE_SHARE) * period_s:
                 missed += 1  # two writes that near to each other would be a burst
-            self.skipped_tick_count += missed
+            if self._config.acu.reply_deadline_s <= period_s:  # else it is polled as fast as it answers
+                self.skipped_tick_count += missed
             ticks = max(1 + missed, round(REST_S / period_s)) if self._may_rest() else 1 + missed
             due_tai_s = round(due_tai_s / period_s + ticks) * period_s
             log.debug("tick", late_ms=1e3 * late_s, skipped=missed, status=self._area.state.intake.status)
@@ -183,7 +184,7 @@ class Foreground:
         before, self._connect_count = self._connect_count, self._port.connect_count
         is_another = before != self._connect_count and self._area.state.startup.stage is not StartStage.NEW
         rest_s = REST_S if self._config.is_resting else 0.0
-        is_blind = self._clock.monotonic_s() - self._status_s > BLIND_S + rest_s
+        is_blind = self._clock.monotonic_s() - self._status_s > max(BLIND_S, self._config.acu.silence_s) + rest_s
         return self._port.silence_s if self._port.is_up and not is_another and not is_blind else math.inf
 
     async def _do(self, command: Command) -> bool:
@@ -192,13 +193,13 @@ class Foreground:
         True: a reply came, be it a refusal.
         """
         answer = await self._port.exchange(command)
-        if isinstance(command, PointAndPoll | Poll) and answer.reply is not None:
+        if isinstance(command, PointAndPoll | Poll) and answer.reply is not None and not self._port.no_contact:
             self._status_s = self._clock.monotonic_s()
         if isinstance(command, PointAndPoll) and isinstance(answer.reply, AcuStatus):
             self.write_count += 1
         self._hear(command, answer)
-        if isinstance(answer.reply, Refused):
-            await self._poll_after_nak(command)
+        if isinstance(answer.reply, Refused) and not self._port.no_contact:
+            await self._poll_after_nak(command, answer.reply.why)
         return answer.reply is not None
 
     async def _question(self) -> bool:
@@ -210,8 +211,8 @@ class Foreground:
             return await self._do(question)
         return (await self._port.exchange(question)).reply is not None
 
-    async def _poll_after_nak(self, refused: Command) -> None:
-        self._log.warning("acu.nak", command=command_text(refused))
+    async def _poll_after_nak(self, refused: Command, why: str) -> None:
+        self._log.warning("acu.nak", command=command_text(refused), **({"reason": why} if why else {}))
         await self._port.idle_gap()
         answer = await self._port.exchange(Poll())
         if isinstance(answer.reply, AcuStatus):

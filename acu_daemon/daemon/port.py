@@ -9,9 +9,9 @@ from typing import Any
 
 import structlog
 
-from acu_daemon.acu.commands import Command, PointAndPoll, Poll
+from acu_daemon.acu.commands import Command, PointAndPoll, PointAt, Poll
 from acu_daemon.acu.driver import AcuDriver
-from acu_daemon.acu.replies import AcuIdentity, AcuStatus, Reply
+from acu_daemon.acu.replies import AcuIdentity, AcuStatus, Done, Refused, Reply
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.link import Link, open_once
 from acu_daemon.errors import LinkError
@@ -19,6 +19,7 @@ from acu_daemon.errors import LinkError
 CYCLE_SHARE = 0.95  # of the period, for a write and an exchange beside it
 FIRST_BACK_OFF_S = 0.1
 FIRST_POLL_S = 0.6  # so long an open link is asked for its first answer: all four questions, and the poll once more
+FIRST_TRIES = 1.5  # deadlines, where those are long
 LAST_BACK_OFF_S = 1.0  # a pass is short: more than a second of waiting costs more than an attempt
 SHORTEST_WAIT_S = 0.001
 LATENCY_COUNT = 100
@@ -57,6 +58,7 @@ class AcuPort:
         self._first: Answer | None = None
         self._broken = ""  # why the present connection is
         self.problem = ""
+        self.no_contact = ""  # why what answers does not reach the antenna
         self.last_reply_s = clock.monotonic_s()
         self._unanswered_s: float | None = None  # start of the first exchange since then that brought no reply
         self.connect_count = 0
@@ -111,7 +113,19 @@ class AcuPort:
         return self._both_s + 2 * max(self._latencies_s)
 
     async def exchange(self, command: Command) -> Answer:
-        """Send a command and wait for its reply until the deadline; a dead link is reported and reopened by `keep`."""
+        """Send a command and wait for its reply until the deadline; a dead link is reported and reopened by `keep`.
+
+        An ACU that cannot do both in one exchange is told the angles first, and asked for its status when it has them.
+        """
+        if isinstance(command, PointAndPoll) and not self._driver.capabilities.has_combined_write:
+            answer = await self._exchange(PointAt(command.az_deg, command.el_deg))
+            if not isinstance(answer.reply, Done):
+                return answer
+            await self.idle_gap()
+            command = Poll()
+        return await self._exchange(command)
+
+    async def _exchange(self, command: Command) -> Answer:
         started_s, started_tai_s = self._clock.monotonic_s(), self._clock.tai_s()
         first_byte_s: float | None = None
         reply: Reply | None = None
@@ -120,7 +134,10 @@ class AcuPort:
                 self._driver.receive(unread, started_s)
             frame = self._driver.begin(command, started_s)
             wire_s = self._driver.wire_bytes(command) * self._link.byte_time_s
-            self._link.write(frame)
+            if frame:
+                self._link.write(frame)
+            else:
+                reply = self._driver.receive(b"", started_s)
             until_s = asyncio.get_running_loop().time() + self._deadline_s
             with contextlib.suppress(TimeoutError):
                 while reply is None:
@@ -136,9 +153,11 @@ class AcuPort:
             self._unanswered_s = started_s if self._unanswered_s is None else self._unanswered_s
             return Answer(None, started_tai_s, None)
         ended_s = self._clock.monotonic_s()
-        if not isinstance(reply, AcuIdentity) or reply.is_known:  # an identity is free text: another may be garble
+        self.no_contact = reply.why if isinstance(reply, Refused) and reply.has_no_contact else ""
+        is_free_text = isinstance(reply, AcuIdentity) and not reply.is_known  # it may be garble
+        if frame and not is_free_text and not self.no_contact:
             self.last_reply_s, self._unanswered_s = ended_s, None
-        elif self._unanswered_s is None:
+        elif frame and self._unanswered_s is None:
             self._unanswered_s = started_s
         self._latencies_s[self._latency_count % LATENCY_COUNT] = max(0.0, ended_s - started_s - wire_s)
         self._latency_count += 1
@@ -187,7 +206,8 @@ class AcuPort:
         """Close and reopen a link without a valid reply for long, so that no unsent write arrives as a burst."""
         if self.is_up and self.silence_s > self._driver.capabilities.silence_s:
             late = f"; they come {self.lateness}" if self._driver.late_at_s > self.last_reply_s else ""
-            self._drop(f"no valid reply for {self.silence_s:.1f} s{late}")
+            why = f": {self.no_contact}" if self.no_contact else late
+            self._drop(f"no valid reply for {self.silence_s:.1f} s{why}")
 
     def _drop(self, problem: str) -> None:
         if self.is_up:
@@ -210,7 +230,7 @@ class AcuPort:
                         reported = str(error)
                         self._log.warning("link.closed", link=self._link.description, reason=reported)
                     self.attempt_count += 1
-                    await self._link.close()
+                    await self._close()
                     await asyncio.sleep(pause_s)
                     is_there = self._driver.late_at_s > opened_s
                     pause_s = FIRST_BACK_OFF_S if is_there else min(2 * pause_s, LAST_BACK_OFF_S)
@@ -219,10 +239,14 @@ class AcuPort:
                 self._log.info("link.open", link=self._link.description)
                 await self._reopen.wait()
                 self._log.warning("link.lost", link=self._link.description, reason=self.problem)
-                await self._link.close()
+                await self._close()
         finally:
             self._up.clear()
             await self._link.close()
+
+    async def _close(self) -> None:
+        await self._link.close()
+        self._driver.forget()
 
     async def open(self, *, tries_all: bool = False) -> None:
         """Open the link once.  It counts as up when the ACU has answered a poll on it.  LinkError: it has not.
@@ -242,13 +266,15 @@ class AcuPort:
 
     async def _first_poll(self) -> Answer:
         self._broken, late_count = "", self._driver.late_count
-        end_s = asyncio.get_running_loop().time() + FIRST_POLL_S
+        end_s = asyncio.get_running_loop().time() + max(FIRST_POLL_S, FIRST_TRIES * self._deadline_s)
         while asyncio.get_running_loop().time() < end_s:
             answer = await self.ask()
-            if answer is not None and answer.reply is not None:
+            if answer is not None and answer.reply is not None and not self.no_contact:
                 return answer
             if self._broken:
                 raise LinkError(self._broken)
+        if self.no_contact:
+            raise LinkError(f"{self._link.description} is open, but the antenna does not answer it: {self.no_contact}")
         if self._driver.late_count > late_count:
             raise LinkError(f"{self._link.description} is open, but all replies come too late: {self.lateness}")
         raise LinkError(f"{self._link.description} is open, but no ACU answers: check address and baud rate")

@@ -9,6 +9,7 @@ from typing import Any
 import structlog
 
 from acu_daemon.acu.driver import AcuDriver
+from acu_daemon.acu.replies import beyond_own_limits
 from acu_daemon.assist.mount_memory.whole_pass import PassEstimate
 from acu_daemon.assist.session.refit import RefitSetup
 from acu_daemon.control.control_config import ControlConfig
@@ -233,7 +234,10 @@ class Service:
         if self._area.state.intake.status is None and elapsed_s > FIRST_POLL_S and not self._job.is_anew:
             why = self._port.problem or "no answer"
             raise NoAcuError(f"no good poll within {FIRST_POLL_S:g} s: {why}")
+        axes = self._job.control
         identity, is_sure = self._area.state.startup.identity, self._area.state.startup.is_identity_sure
+        if identity is not None and is_sure and (why := beyond_own_limits(identity, axes.azimuth, axes.elevation)):
+            raise UsageError(f"{identity}: {why}")
         if self._job.is_rehearsal and identity is not None and is_sure and not identity.is_simulated:
             raise UsageError(
                 f"the ACU is a real one ({identity}): a rehearsal (--at) runs only on a simulated ACU; leave out --at"

@@ -59,6 +59,8 @@ def verdict(seen: Snapshot) -> Verdict:
     if state is S.AVOID:
         why = seen.limit_alarm or "the path is clear again at once"
         return Verdict("AVOIDING", Level.WATCH, f"a keep-out is on the path, the antenna is led clear of it: {why}")
+    if state is S.PROGRAM:
+        return _by_program(seen)
     return _blind(seen, state)
 
 
@@ -109,6 +111,13 @@ def _tracking(seen: Snapshot) -> Verdict:
     if seen.is_on_path is False and seen.path == "fit":
         return Verdict("TRACKING", Level.WATCH, "the ACU tracks a signal that is not on the fitted path")
     return Verdict("TRACKING", Level.GOOD, "the ACU tracks the signal")
+
+
+def _by_program(seen: Snapshot) -> Verdict:
+    path = f"the path of the {seen.path}" if seen.path else "the path"
+    if seen.is_on_path is not True:
+        return Verdict("OFF PATH", Level.BAD, f"program track, and the antenna is half a beam or more off {path}")
+    return Verdict("PROGRAM TRACK", Level.GOOD, f"the antenna is led along {path}; no signal is waited for")
 
 
 def _blind(seen: Snapshot, state: TrackState) -> Verdict:

@@ -24,6 +24,7 @@ from acu_daemon.acu.commands import (
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.orders import Event, Orders
 from acu_daemon.control.registers import count_refusals
+from acu_daemon.control.startup import reached
 from acu_daemon.control.state import ControlState, StartStage
 from acu_daemon.pointing.envelope import Envelope
 
@@ -64,7 +65,8 @@ def refusal(command: Command, state: ControlState, now_tai_s: float, config: Con
 
 
 def _of_kind(command: Command, state: ControlState, now_tai_s: float, config: ControlConfig) -> str:
-    stage, is_ready = state.startup.stage, state.startup.stage is StartStage.READY
+    stage = reached(state.startup.stage, config)
+    is_ready = stage is StartStage.READY
     match command:
         case PointAndPoll(az_deg=az_deg, el_deg=el_deg) if is_ready:
             return _of_write(az_deg, el_deg, state, now_tai_s, config)

@@ -26,7 +26,8 @@ def watch_for_stop(before: ControlState, state: ControlState, config: ControlCon
     now, held = state.intake.status, state.foreign_stop.held
     if now is before.intake.status or now is None or state.intake.reading is None or held is None:
         return state, False
-    is_stopped = now.mode is AcuMode.STANDBY and now.backup_selected is Backup.REMOTE
+    has_backup = now.backup_selected is Backup.REMOTE or not config.acu.has_backup
+    is_stopped = now.mode is AcuMode.STANDBY and has_backup
     is_stopped = is_stopped and now.is_remote_enabled  # else it is the local panel's, and ends with it
     in_force = before.registers.in_force
     unwritten_s = inf if in_force is None else state.intake.reading.tai_s - in_force[0]

@@ -85,12 +85,19 @@ class TurnWatch:
         return "; ".join(text for text in (self.problem, bit) if text)
 
 
-def locate(watch: TurnWatch, status: AcuStatus, limits: AxisLimits, near_deg: float | None) -> tuple[TurnWatch, float]:
+def locate(
+    watch: TurnWatch, status: AcuStatus, limits: AxisLimits, near_deg: float | None, *, has_bit: bool = True
+) -> tuple[TurnWatch, float]:
     """Where the azimuth is, continuous.  near_deg: where it was a moment ago; None: not known, or not to be relied on.
 
     What speaks against the turn that was counted is believed after AGAINST_COUNT readings in a row: beside the zenith
-    the noise of an azimuth is many degrees.  What the bit says is compared with the turn, and counted.
+    the noise of an azimuth is many degrees.  What the bit says, where there is one, is compared with the turn, and
+    counted.  An ACU that counts the turns itself is believed.
     """
+    if status.turns_deg is not None:
+        az_deg = nearest_turn(status.turns_deg, status.turns_deg, limits)
+        watch = watch if watch.is_sure else replace(watch, is_sure=True, sure_count=SURE_COUNT)
+        return watch, status.turns_deg if az_deg is None else az_deg
     end = int(status.is_at_cw_limit) - int(status.is_at_ccw_limit)
     az_deg = encoder_continuous(status.az_deg, status.is_sector_high, limits, near_deg=near_deg, end=end)
     if near_deg is not None:
@@ -101,7 +108,7 @@ def locate(watch: TurnWatch, status: AcuStatus, limits: AxisLimits, near_deg: fl
         watch = watch if against_count == watch.against_count else replace(watch, against_count=against_count)
     if is_one_turn(limits):
         return watch, az_deg
-    watch = _judge_bit(watch, status, az_deg, limits)
+    watch = _judge_bit(watch, status, az_deg, limits) if has_bit else watch
     end_deg = {1: limits.max_deg, -1: limits.min_deg}.get(end)
     is_at_end = end_deg is not None and abs(az_deg - end_deg) <= END_SLACK_DEG
     is_shown = is_at_end or len(turns_of(status.az_deg, limits, END_SLACK_DEG)) == 1

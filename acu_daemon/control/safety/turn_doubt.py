@@ -231,7 +231,7 @@ def locate_azimuth(
     is_doubted = turn.phase is not Phase.BELIEVED or turn.wrong_half is not None
     is_counted = state.startup.stage is StartStage.READY or turn.is_sure or is_doubted
     near_deg = before_deg if is_counted and moved_deg < LONGEST_STEP_DEG else None
-    new, az_deg = locate(turn, status, config.azimuth, near_deg)
+    new, az_deg = locate(turn, status, config.azimuth, near_deg, has_bit=config.acu.has_sector_bit)
     if new.wrong_half is not None and turn.wrong_half is None:
         action = "the turn is counted without it"
         fields = {"az_deg": az_deg, "sector_bit": int(status.is_sector_high), "action": action}

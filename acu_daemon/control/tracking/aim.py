@@ -1,6 +1,7 @@
 """Where the registers shall point: along the path, for the moment they take effect.  Pure."""
 
 from dataclasses import replace
+from math import copysign
 
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState
@@ -11,6 +12,8 @@ from acu_daemon.control.tracking.scan import pointing
 from acu_daemon.control.tracking.state_table import ACTIVE, AUTOTRACKING, TrackState
 from acu_daemon.model import Pointing
 from acu_daemon.pointing.wrap import nearest_turn
+
+AHEAD_DEG_S = 0.01  # slower is standing
 
 
 def aim(state: ControlState, sky: Sky, now_tai_s: float, config: ControlConfig) -> Pointing:
@@ -24,8 +27,17 @@ def aim(state: ControlState, sky: Sky, now_tai_s: float, config: ControlConfig) 
     el = az if lag_el_s == lag_az_s else _point(state, sky, aim_tai_s + lag_el_s, config, is_followed=is_followed)
     if az is None or el is None:
         return _rest(state, is_followed=is_followed)
-    az_deg = _on_turn(az.az_deg, state, config, is_followed=is_followed)
-    return Pointing(az_deg, el.el_deg, az.az_rate_deg_s, el.el_rate_deg_s)
+    az_deg, el_deg = _on_turn(az.az_deg, state, config, is_followed=is_followed), el.el_deg
+    if config.acu.dead_band_deg and is_followed:
+        half_deg = config.acu.dead_band_deg / 2
+        az_deg += _ahead(az.az_rate_deg_s) * half_deg
+        el_deg += _ahead(el.el_rate_deg_s) * half_deg
+    return Pointing(az_deg, el_deg, az.az_rate_deg_s, el.el_rate_deg_s)
+
+
+def _ahead(rate_deg_s: float) -> float:
+    """An antenna that is sent on only when it is a dead band behind goes half of that ahead: so it is as far before."""
+    return 0.0 if abs(rate_deg_s) < AHEAD_DEG_S else copysign(1.0, rate_deg_s)
 
 
 def _point(

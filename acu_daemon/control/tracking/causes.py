@@ -109,6 +109,8 @@ def _of_signal(state: ControlState, status: AcuStatus, given: TickInput, config:
     causes: set[Cause] = set()
     if sky.prediction is not None:
         causes.add(Cause.FIT if sky.is_fitted else Cause.FIT_LEFT)
+    if not config.has_signal:
+        return causes
     if is_acquired(status):
         if _is_ours(state, status, given, config):
             causes.add(Cause.ACQUIRED_FITTED if sky.is_fitted else Cause.ACQUIRED)
@@ -175,6 +177,9 @@ def _of_place(
     is_there = status.mode is AcuMode.REMOTE and is_on_turn and distance_deg < ON_POINT_BEAMS * config.beamwidth_deg
     is_heard = is_in_pass and not is_on_turn and status.is_acquired and status.mode in (AcuMode.REMOTE, AcuMode.STANDBY)
     causes: set[Cause] = set()
+    if not config.has_signal:
+        is_on_path = is_on_turn and distance_deg <= config.beamwidth_deg / 2 + config.acu.dead_band_deg
+        return {Cause.ON_PROGRAM} if is_on_path and status.mode is AcuMode.REMOTE else set()
     if is_there or (is_heard and distance_deg < HEARD_BEAMS * config.beamwidth_deg):
         causes.add(Cause.ON_POINT_FITTED if sky.is_fitted else Cause.ON_POINT)
     if distance_deg < RESUME_DEG:

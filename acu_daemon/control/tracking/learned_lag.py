@@ -12,7 +12,7 @@ STEADY_SHARE = 0.1  # of a step of the registers: more change than that from one
 
 def learn_lag(state: ControlState, az_deg: float, el_deg: float, config: ControlConfig) -> ControlState:
     """The newest of three commands is not in force yet when the angles are sampled: learn from the one before it."""
-    if len(state.registers.commands) < 3:
+    if config.acu.dead_band_deg or len(state.registers.commands) < 3:  # a rotator that waits shows no lag
         return state
     before, in_force, newest = state.registers.commands[-3:]
     if before is None or in_force is None or newest is None:

@@ -1,6 +1,7 @@
 """Which mode or backup the present state needs: judged by the status, so a command repeats until it shows."""
 
 from acu_daemon.acu.commands import AcuMode, Backup, Command, SelectBackup, SelectMode
+from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tracking.state_table import AUTOTRACKING, HOLDING, LED, TrackState
 
@@ -8,7 +9,7 @@ STANDBY = SelectMode(AcuMode.STANDBY)  # the one mode command that the ACU takes
 UNDER_AUTOTRACK = AUTOTRACKING | HOLDING | {TrackState.ACQUIRE_TLE, TrackState.SEARCH}
 
 
-def wanted_mode_command(state: ControlState, *, is_settled: bool) -> Command | None:
+def wanted_mode_command(state: ControlState, config: ControlConfig, *, is_settled: bool) -> Command | None:
     """The next command on the way to what the state needs; None when the ACU is there.
 
     The backup comes before the mode, and the registers are written before either (docs/adding-an-acu.md, Modes).
@@ -22,7 +23,7 @@ def wanted_mode_command(state: ControlState, *, is_settled: bool) -> Command | N
     is_stuck = status.mode is AcuMode.STANDBY and status.is_autotrack_selected  # selected again, it would not change
     if status.mode is AcuMode.STOWED or (is_stuck and is_settled):
         return STANDBY
-    if status.backup_selected is not Backup.REMOTE:
+    if config.acu.has_backup and status.backup_selected is not Backup.REMOTE:
         return SelectBackup(Backup.REMOTE)
     if state.tracking.track in LED:
         return SelectMode(AcuMode.REMOTE) if status.mode is not AcuMode.REMOTE else None

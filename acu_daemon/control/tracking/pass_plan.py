@@ -10,7 +10,7 @@ from acu_daemon.assist.session.prediction import predict
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick_input import PassPlan, Sky
 from acu_daemon.control.tracking.approach import ACQUIRE_LEAD_S, way_s
-from acu_daemon.control.tracking.state_table import AUTOTRACKING
+from acu_daemon.control.tracking.state_table import AUTOTRACKING, TrackState
 from acu_daemon.model import AxisLimits, Pass, Site, ZenithCrossing
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.pointing.keyhole import KeyholeRules, longest_window_s
@@ -18,6 +18,7 @@ from acu_daemon.pointing.reach import OutOfReach, out_of_reach
 from acu_daemon.pointing.turn_plan import TurnAsk, plan_turns
 from acu_daemon.pointing.wrap import choose_turn, judged, middle_deg
 
+STEERED = AUTOTRACKING | {TrackState.PROGRAM}
 COARSE_STEP_S, MOST_STEPS = 0.5, 20000  # of these a tenth of a second's work, in the loop
 ANY_ELEVATION = AxisLimits(-90.0, 180.0, 1.0, 1.0)
 LEAST_KEYHOLE_EL_DEG, MOST_AROUND_S = 60.0, 400.0  # lower, and slower, no drive crosses the zenith in a window
@@ -118,7 +119,7 @@ def is_tracked(state: ControlState, sky: Sky, now_tai_s: float) -> bool:
     """Whether this pass is held, or has been: then what was seen of it counts for more than another clock."""
     plan = sky.plan
     is_in_pass = plan is not None and plan.rise_tai_s - ACQUIRE_LEAD_S <= now_tai_s <= pass_end_tai_s(plan, sky)
-    return state.tracking.track in AUTOTRACKING or sky.fit is not None or (is_in_pass and state.signal.has_acquired)
+    return state.tracking.track in STEERED or sky.fit is not None or (is_in_pass and state.signal.has_acquired)
 
 
 def why_over(sky: Sky, now_tai_s: float, end_tai_s: float) -> str:

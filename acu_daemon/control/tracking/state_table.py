@@ -17,6 +17,7 @@ class TrackState(StrEnum):
     ACQUIRE_TLE = "ACQUIRE/TLE"
     AUTOTRACK_TLE = "AUTOTRACK/TLE"
     AUTOTRACK_FITTED = "AUTOTRACK/FITTED"
+    PROGRAM = "PROGRAM"
     HOLD_FITTED = "HOLD/FITTED"
     HOLD_TLE = "HOLD/TLE"
     SEARCH = "SEARCH"
@@ -45,6 +46,7 @@ class Cause(StrEnum):
     PASS_OVER = "the pass is over"
     ON_POINT = "the antenna stands on the predicted path"
     ON_POINT_FITTED = "the antenna stands on the path of this pass's fit"
+    ON_PROGRAM = "the antenna stands on the predicted path, and no signal is waited for"
     STILL_SELECTED = "autotrack is still selected, near the predicted path"
     STILL_FITTED = "interrupted in mid-pass, and a fit of this pass exists"
     ACQUIRED = "the signal is acquired"
@@ -69,14 +71,14 @@ class Cause(StrEnum):
 S = TrackState
 ACTIVE = frozenset(
     {
-        S.PREPOSITION,
+        *(S.PREPOSITION, S.PROGRAM),
         *(S.ACQUIRE_TLE, S.AUTOTRACK_TLE, S.AUTOTRACK_FITTED, S.HOLD_FITTED, S.HOLD_TLE, S.SEARCH, S.ZENITH, S.AVOID),
     }
 )
 TRACKING = ACTIVE - {S.PREPOSITION, S.AVOID}
 HOLDING = frozenset({S.HOLD_FITTED, S.HOLD_TLE})
 AUTOTRACKING = frozenset({S.AUTOTRACK_TLE, S.AUTOTRACK_FITTED})
-LED = frozenset({S.PREPOSITION, S.ZENITH, S.AVOID})  # by the registers alone: autotrack is not selected
+LED = frozenset({S.PREPOSITION, S.PROGRAM, S.ZENITH, S.AVOID})  # by the registers alone: autotrack is not selected
 ANY = frozenset(TrackState)
 NO_LINK = frozenset({S.LINK_LOST})
 
@@ -116,6 +118,7 @@ TABLE: tuple[Row, ...] = (
         "before the rise: preposition_s, or as the way takes",
     ),
     Row(frozenset({S.PREPOSITION}), Cause.ON_POINT_FITTED, S.HOLD_FITTED),
+    Row(frozenset({S.PREPOSITION}), Cause.ON_PROGRAM, S.PROGRAM, "20 s before the rise or later"),
     Row(frozenset({S.PREPOSITION}), Cause.ON_POINT, S.ACQUIRE_TLE, "20 s before the rise or later"),
     Row(TRACKING, Cause.MODE_LEFT, S.IDLE),
     Row(AUTOTRACKING | HOLDING | {S.ACQUIRE_TLE}, Cause.ZENITH_NEAR, S.ZENITH, "2 s before the departure"),

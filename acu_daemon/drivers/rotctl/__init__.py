@@ -1,0 +1,1 @@
+"""Rotators of amateur radio behind Hamlib's rotctld, on TCP: position only.  Pure."""
