@@ -34,6 +34,7 @@ COMMANDS = {  # name: module of acu_daemon.cli, and the function in it
     "fake-acu": ("fake_acu", "command"),
     "fault-proxy": ("fault_proxy", "command"),
     "demo": ("demo", "command"),
+    "rehearse": ("rehearse", "command"),
     "passes": ("coming_passes", "command"),
     "schedule": ("schedule_command", "command"),
     "pause": ("schedule_command", "pause"),

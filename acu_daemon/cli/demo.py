@@ -8,16 +8,15 @@ import sys
 import tempfile
 import time
 from collections.abc import AsyncIterator
-from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import structlog
 import typer
 
 from acu_daemon.acu.commands import AcuMode, Backup, SelectBackup, SelectMode
-from acu_daemon.cli.options import Target, coming_pass, load_target, whose_recording
+from acu_daemon.cli.options import Target, at_acu, coming_pass, load_target, whose_recording
 from acu_daemon.cli.run import make_job
 from acu_daemon.cli.simulated import station_air
 from acu_daemon.daemon.live import LiveLine
@@ -36,7 +35,7 @@ from acu_daemon.edge.signals import take_signals
 from acu_daemon.errors import AcuDaemonError, UsageError
 from acu_daemon.model import sky_angle_deg
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
-from acu_daemon.report.pass_trace import Figures, measure, read_trace
+from acu_daemon.report.pass_trace import Figures, figures_table, measure, read_trace
 from acu_daemon.sim.build import make_sky
 from acu_daemon.sim.scenario import Loss, Scenario, read_scenario
 from acu_daemon.sim.sky import SimulatedSky
@@ -153,9 +152,7 @@ async def _fake_acu(config: Path, at_monotonic_s: float, trace: Path) -> AsyncIt
 async def _assisted(
     config: Path, url: str, clock: SystemClock, scene: tuple[Scenario, SimulatedSky], out: Path
 ) -> Outcome:
-    target = load_target(config, SATELLITE, clock.tai_s())
-    station = target.station
-    target = replace(target, station=station.model_copy(update={"acu": station.acu.model_copy(update={"url": url})}))
+    target = at_acu(load_target(config, SATELLITE, clock.tai_s()), url)
     live = LiveLine() if sys.stderr.isatty() else None
     configure_logs(
         clock.tai_s,
@@ -219,18 +216,7 @@ def _report(out: Path) -> Figures:
     first = traces["assisted"]
     title = f"SIMULATION, REHEARSAL: DEMO-1 over Cuiaba, {utc_text(float(first.tai_s[0]), 0)}"
     plot_passes(out / "demo.png", traces, 1.0, title)
-    rows: list[tuple[str, Any]] = [
-        ("beam on the satellite, s", lambda f: f"{f.seconds_on_satellite:.1f} of {f.seconds:.1f}"),
-        ("signal received, s", lambda f: f"{f.seconds_acquired:.1f}"),
-        ("no signal by the scenario, s", lambda f: f"{f.seconds_without_signal:.1f}"),
-        ("longest time off the satellite, s", lambda f: f"{f.longest_off_s:.1f}"),
-        ("median beam error, deg", lambda f: f"{f.median_deg:.3f}"),
-        ("largest beam error, deg", lambda f: f"{f.worst_deg:.2f}"),
-        ("on the satellite at the end", lambda f: "yes" if f.is_on_satellite_at_end else "no"),
-    ]
-    typer.echo(f"\nSIMULATION{'':26}" + "".join(f"{label:>16}" for label in figures))
-    for name, show in rows:
-        typer.echo(f"{name:36}" + "".join(f"{show(one):>16}" for one in figures.values()))
+    typer.echo("\n" + "\n".join(figures_table(figures)))
     typer.echo(f"\npicture    {out / 'demo.png'}")
     typer.echo(f"traces     {out / 'assisted.csv'}  {out / 'rate-memory.csv'}")
     typer.echo(f"readings   {out / 'readings.csv'}   (acu-daemon replay reads it)")

@@ -86,6 +86,18 @@ def antenna_of(station: StationFile) -> StateOwner:
     return StateOwner.of(station.station.name, station.acu.url, station.acu.address)
 
 
+def chosen_acu(config: Path, asked: str | None, *, may_choose: bool) -> str:
+    """URL of the ACU: that of --acu, else the station's.  UsageError: another one may not be chosen here."""
+    if asked is None:
+        return load_station(config).acu.url
+    if not may_choose:
+        raise UsageError(
+            f"--acu {asked}: this would track with another ACU than {config / 'station.toml'} names; rehearse there "
+            "with --at, or say --same-antenna where that ACU moves the same antenna"
+        )
+    return asked
+
+
 def check_duration(duration_s: float | None) -> None:
     """UsageError: --duration is no time."""
     if duration_s is not None and not 0.0 < duration_s < float("inf"):
@@ -143,6 +155,14 @@ def load_target(
     if earth.warning:
         elements = replace(elements, warnings=[*elements.warnings, earth.warning])
     return Target(station, satellite, elements, earth)
+
+
+def at_acu(target: Target, url: str | None) -> Target:
+    """The same over the same station, with its ACU reached at another URL; None: where its file says."""
+    if url is None:
+        return target
+    acu = target.station.acu.model_copy(update={"url": url})
+    return replace(target, station=target.station.model_copy(update={"acu": acu}))
 
 
 def last_fit(satellite: SatelliteFile, station: StationFile, folders: Sequence[Path]) -> LastFit | None:

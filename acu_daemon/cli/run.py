@@ -30,7 +30,9 @@ from acu_daemon.cli.options import (
     Satellite,
     Target,
     antenna_of,
+    at_acu,
     check_duration,
+    chosen_acu,
     coming_pass,
     ending,
     load_target,
@@ -113,6 +115,18 @@ def command(
         bool,
         typer.Option("--shadow", help="Command nothing: poll, fit, predict and record while somebody else steers."),
     ] = False,
+    acu: Annotated[
+        str | None,
+        typer.Option(
+            "--acu",
+            metavar="URL",
+            help="In place of acu.url of station.toml, state and all else as of this antenna.  With --at: a simulated "
+            "ACU.  Else only together with --same-antenna.",
+        ),
+    ] = None,
+    same_antenna: Annotated[
+        bool, typer.Option("--same-antenna", help="The ACU of --acu moves the antenna of station.toml.")
+    ] = False,
 ) -> None:
     """Track a satellite: the pass in progress, else the next one.
 
@@ -127,7 +141,8 @@ def command(
         faulthandler.enable(STDERR)  # the service's watchdog ends a hung daemon by SIGABRT: say where it hung
     keep_to_this_thread()
     check_duration(duration)
-    clock, met = meet_in_rehearsal("" if at is None else load_station(config).acu.url, Role.DAEMON, at, at_monotonic)
+    url = chosen_acu(config, acu, may_choose=at is not None or same_antenna)
+    clock, met = meet_in_rehearsal("" if at is None else url, Role.DAEMON, at, at_monotonic)
     end_s = math.inf if duration is None else PROCESS_START_S + duration
     with contextlib.ExitStack() as ends:
         output, files = Writer("log", on_drained=tell_dropped), Writer("files")
@@ -152,14 +167,14 @@ def command(
         older = () if clock.is_rehearsal else older_folders(base, antenna)  # nothing is carried between rehearsals
         target = _load(config, satellite, clock, (directory, *older))
         coming_pass(target, clock.tai_s())
-        _tell_clock(met if clock.is_rehearsal else met_by_chance(target.station.acu.url, clock), clock)
-        link = make_link(target.station.acu.url)
+        _tell_clock(met if clock.is_rehearsal else met_by_chance(url, clock), clock)
+        link = make_link(url)
         check_rate(link, driver_of(target.station), target.station.acu.period_s, target.station.acu.device_delay_s)
         whose = whose_recording(target, is_rehearsal=clock.is_rehearsal)
         recording = None
         if record is not None:
             recording = ends.enter_context(RecordingWriter(record, files, clock.tai_s(), whose))
-        frame = RunSetup(config, satellite, clock, link, directory, files, end_s, shadow, older)
+        frame = RunSetup(config, satellite, clock, link, directory, files, end_s, shadow, older, acu)
         weather = WeatherWatch(config, target, clock.tai_s())
         first = prepare(frame, weather.on(target))
         runner = ends.enter_context(loop_runner())  # where the system denies even that, another start is refused too
@@ -205,7 +220,7 @@ def _confirm(config: Path, target: Target, epoch_tai_s: float) -> None:
 class RunSetup:
     """What stays the same from one run of this process to the next.
 
-    end_s: of --duration, on CLOCK_MONOTONIC.  older: other folders of the same antenna's state.
+    end_s: of --duration, on CLOCK_MONOTONIC.  older: other folders of the same antenna's state.  acu: URL of --acu.
     """
 
     config: Path
@@ -217,6 +232,7 @@ class RunSetup:
     end_s: float
     is_shadow: bool
     older: tuple[Path, ...] = ()
+    acu: str | None = None
 
     @property
     def folders(self) -> tuple[Path, ...]:
@@ -238,7 +254,7 @@ def prepare(frame: RunSetup, target: Target, memory: ControlState | None = None)
 
     Raises: UsageError: no pass is coming, or the elements do not cover it.
     """
-    clock = frame.clock
+    clock, target = frame.clock, at_acu(target, frame.acu)
     coming = coming_pass(target, clock.tai_s())
     _announce(target, coming, clock, is_shadow=frame.is_shadow)
     kept = open_kept(frame.directory, target, coming, clock, frame.files, frame.older)

@@ -1,7 +1,8 @@
 """What a simulated pass looked like, as arrays: read from the trace that the fake ACU writes."""
 
 import csv
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,13 @@ def read_trace(path: Path) -> Trace:
     )
 
 
+def until(trace: Trace, end_tai_s: float) -> Trace:
+    """The part of a trace up to an instant."""
+    count = int(np.searchsorted(trace.tai_s, end_tai_s, side="right"))
+    arrays = {one.name: getattr(trace, one.name)[:count] for one in fields(trace)}
+    return Trace(**arrays)
+
+
 @dataclass(frozen=True, slots=True)
 class Figures:
     """What counts of a pass, from the first acquisition to the end."""
@@ -80,3 +88,18 @@ def measure(trace: Trace, beamwidth_deg: float) -> Figures:
         median_deg=float(np.nanmedian(error)),
         is_on_satellite_at_end=not bool(is_off[-1]),
     )
+
+
+def figures_table(figures: dict[str, Figures]) -> list[str]:
+    """Lines of a table for people, a column for each label."""
+    rows: list[tuple[str, Callable[[Figures], str]]] = [
+        ("beam on the satellite, s", lambda f: f"{f.seconds_on_satellite:.1f} of {f.seconds:.1f}"),
+        ("signal received, s", lambda f: f"{f.seconds_acquired:.1f}"),
+        ("no signal by the scenario, s", lambda f: f"{f.seconds_without_signal:.1f}"),
+        ("longest time off the satellite, s", lambda f: f"{f.longest_off_s:.1f}"),
+        ("median beam error, deg", lambda f: f"{f.median_deg:.3f}"),
+        ("largest beam error, deg", lambda f: f"{f.worst_deg:.2f}"),
+        ("on the satellite at the end", lambda f: "yes" if f.is_on_satellite_at_end else "no"),
+    ]
+    lines = [f"{'SIMULATION':36}" + "".join(f"{label:>16}" for label in figures)]
+    return lines + [f"{name:36}" + "".join(f"{show(one):>16}" for one in figures.values()) for name, show in rows]
