@@ -28,7 +28,7 @@ from acu_daemon.edge.elements_store import (
     sets_file,
 )
 from acu_daemon.errors import ElementsError
-from acu_daemon.model import Correction, FitResult, Site
+from acu_daemon.model import Correction, FitResult
 from acu_daemon.orbit.element_set import ElementSet
 from acu_daemon.orbit.elements import ElementLimits
 from acu_daemon.orbit.propagator import Propagator
@@ -238,10 +238,11 @@ def test_files_of_a_directory_that_cannot_be_read_are_told_and_cost_nothing(tmp_
     assert "elements source" in checked
 
 
-def test_a_site_that_has_changed_leaves_no_fit(tmp_path: Path) -> None:
+def test_a_fit_over_another_station_is_of_the_same_orbit_and_of_no_other_elements(tmp_path: Path) -> None:
     config(tmp_path)
     keep(tmp_path, PLAIN)
     seen = left(tmp_path, choose(tmp_path).propagator, NOW_TAI_S)
-    fit = LastFit(seen, Site(replace(seen.station, name="elsewhere")), EstimatorSettings())
+    site = load_station(tmp_path).site
+    fit = LastFit(seen, replace(site, station=replace(site.station, name="elsewhere")), EstimatorSettings())
     assert fit.corrects(choose(tmp_path).propagator, NOW_TAI_S + 60.0)  # the orbit is the same from everywhere
     assert not fit.corrects(Sgp4Propagator(NEWER), NOW_TAI_S + 60.0)

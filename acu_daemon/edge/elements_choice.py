@@ -20,7 +20,7 @@ from acu_daemon.config.satellite_tables import BrouwerSection, SatelliteFile
 from acu_daemon.edge.elements_file import LoadedElements, load_elements, load_text
 from acu_daemon.edge.elements_store import doubtful_file, read_sets, sets_file
 from acu_daemon.edge.fetch_state_file import group_file
-from acu_daemon.edge.orbit_file import read_orbit_file
+from acu_daemon.edge.orbit_file import SET_PARSERS, begins_with_sets, read_orbit_file
 from acu_daemon.errors import ElementsError, OrbitError, UsageError
 from acu_daemon.model import EarthOrientation, Site
 from acu_daemon.orbit.aging import expected_error, predicted_error
@@ -191,10 +191,10 @@ def _from_sources(
     has_kept = any(kept.values())
     for path in sources.others():
         try:
+            if has_kept and path.parent == sources.store and begins_with_sets(path):
+                continue  # what is believed of a group is kept apart; not to read it all is worth a tick
             kind, text = read_orbit_file(path)
-            is_of_sets = kind in ("tle", "omm")
-            if is_of_sets and has_kept and path.parent == sources.store:
-                continue  # what is believed of a group is kept apart
+            is_of_sets = kind in SET_PARSERS
             if isinstance(section, BrouwerSection) or (is_of_sets and f"{norad_id}"[-4:] not in text):
                 continue
             found = load_text(satellite, section, path, kind, text, now_tai_s, orientation, at_tai_s, must_match=True)

@@ -16,6 +16,7 @@ from acu_daemon.orbit.sp3 import parse_sp3
 from acu_daemon.orbit.tle import parse_tle
 
 GZIP = b"\x1f\x8b"
+_BEGIN_BYTES = 8192
 MOST_BYTES = 256 * 2**20  # of a file, unpacked
 
 SetParser = Callable[[str, str], tuple[list[ElementSet], list[Problem]]]
@@ -31,6 +32,13 @@ def read_orbit_file(path: Path) -> tuple[FileKind, str]:
     """
     refuse_world_writable(path)
     return contents_of(path.read_bytes(), path)
+
+
+def begins_with_sets(path: Path) -> bool:
+    """Whether a file holds element sets, by its begin alone; one that is packed is not looked into.  OSError."""
+    with path.open("rb") as file:
+        begin = file.read(_BEGIN_BYTES)
+    return not begin.startswith(GZIP) and kind_of(decoded(begin)) in SET_PARSERS
 
 
 def contents_of(data: bytes, path: Path) -> tuple[FileKind, str]:
