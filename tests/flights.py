@@ -81,12 +81,13 @@ def flight_of(
     noise_deg: float = NOISE_DEG,
     sky: SimulatedSky | None = None,
     receiver: ReceiverChoice | None = None,
+    biases_deg: tuple[float, float] = (0.0, 0.0),
     **parts: Any,
 ) -> Flight:
     """Fly; losses, script and faults (as for a control port) in seconds from the beginning."""
     scenario = Scenario(
         sky=errors,
-        encoder=Encoder(noise_deg=noise_deg),
+        encoder=Encoder(*biases_deg, noise_deg),
         receiver=receiver or ReceiverChoice(),
         acu=antenna,
         losses=tuple(loss(begin_tai_s + a, begin_tai_s + b) for a, b in losses),

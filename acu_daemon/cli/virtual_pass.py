@@ -11,6 +11,8 @@ from typing import Any
 
 import structlog
 
+from acu_daemon.assist.mount_memory.pedestal_memory import PedestalMemory
+from acu_daemon.assist.mount_memory.whole_pass import PassEstimate
 from acu_daemon.assist.session.refit import RefitSetup
 from acu_daemon.cli.options import Target, coming_pass
 from acu_daemon.cli.run import make_job
@@ -44,6 +46,7 @@ class Flight:
     writes: list[RegisterWrite] = field(default_factory=list)  # what the ACU accepted
     events: list[dict[str, Any]] = field(default_factory=list)  # the log
     outcome: Outcome | None = None
+    estimates: list[PassEstimate] = field(default_factory=list)  # what the pass said of the pedestal, with a memory
 
     def states(self) -> list[str]:
         """The states of the daemon in their order."""
@@ -95,6 +98,7 @@ def fly(
     is_shadow: bool = False,
     is_resting: bool = False,
     script: Sequence[tuple[float, Action]] = (),
+    memory: PedestalMemory | None = None,
     make_acu: Callable[[AcuParts], FakeAcu] = FakeAcu,
     make_clock: Callable[[float], LoopClock] = LoopClock,
     make_runner: Callable[[RefitSetup], FitRunner] = InlineFitRunner,
@@ -103,6 +107,7 @@ def fly(
 
     sky: as the antenna meets it (make_sky), or a truth CSV, which is geometric.  script: what happens to the ACU and
     the link, each at its TAI, such as a power cycle.
+    memory: what the station knows of its antenna; None: it keeps no such thing.
     make_...: other parts than the usual ones, such as a clock that stalls.
     """
     flight = Flight()
@@ -133,9 +138,17 @@ def fly(
         link = _TappedLink(acu, clock, byte_time_s, parts.address, flight, board)
         for fault in scenario.faults:
             board.add(fault)
-        job = make_job(target, coming_pass(target, begin_tai_s), link, is_rehearsal=True, end_tai_s=end_tai_s)
+        coming = coming_pass(target, begin_tai_s)
+        job = make_job(target, coming, link, is_rehearsal=True, end_tai_s=end_tai_s, memory=memory)
         job = replace(job, control=replace(job.control, is_shadow=is_shadow, is_resting=is_resting))
-        service = Service(job, link, clock, make_runner(job.refit), on_snapshot=flight.snapshots.append)
+        service = Service(
+            job,
+            link,
+            clock,
+            make_runner(job.refit),
+            on_snapshot=flight.snapshots.append,
+            on_estimate=flight.estimates.append,
+        )
         loop = asyncio.get_running_loop()
         for tai_s, action in script:
             loop.call_later(tai_s - begin_tai_s, action, ScriptAccess(acu, link, clock, service, board))
