@@ -23,7 +23,7 @@ from acu_daemon.pointing.antenna_model import AntennaModel
 from acu_daemon.sim.mount_axes import MountAxes
 from acu_daemon.sim.shell_air import SimulatedAir, simulated_air
 from acu_daemon.units import DAY_S, Array
-from tables.listed_passes import BANDS_DEG, LATITUDES_DEG, LEAST_EL_DEG, LEAST_S, accurate, low_orbits
+from tables.listed_passes import BANDS_DEG, LATITUDES_DEG, LEAST_EL_DEG, LEAST_S, Wrong, accurate, low_orbits
 
 NOISE_DEG = 0.03
 STEP_DAYS = (0.1, 0.5)  # from pass to pass
@@ -68,12 +68,14 @@ def passes_of(
     correlation_s: float = 0.0,
     square_to_deg: float = SQUARE_TO_DEG,
     station: Station | None = None,
+    wrong: Wrong = accurate,
     *,
     has_air: bool = True,
 ) -> Iterator[Seen]:
     """Passes of different satellites over one station with a pedestal of its own.
 
-    correlation_s: of the noise; 0: white.  station: a given one.  has_air: else they are in a vacuum.
+    correlation_s: of the noise; 0: white.  station: a given one.  wrong: how the elements are.
+    has_air: else they are in a vacuum.
     """
     rng = np.random.default_rng([22, seed])
     drawn = Station("", float(rng.choice(LATITUDES_DEG)), float(rng.uniform(-180.0, 180.0)), 100.0)
@@ -90,7 +92,7 @@ def passes_of(
         expected = _any_pass(source, site, now_tai_s, rng)
         if expected is None:
             continue
-        truth = source.corrected(accurate(rng, source, expected.rise_tai_s - source.epoch_tai_s))
+        truth = source.corrected(wrong(rng, source, expected.rise_tai_s - source.epoch_tai_s))
         days = (expected.rise_tai_s - walked_tai_s) / DAY_S
         walked_tai_s = expected.rise_tai_s
         walk_deg = walk_deg + drift.walk_deg_per_root_day * np.sqrt(max(days, 0.0)) * rng.standard_normal(2)
