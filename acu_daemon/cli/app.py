@@ -36,6 +36,7 @@ COMMANDS = {  # name: module of acu_daemon.cli, and the function in it
     "demo": ("demo", "command"),
     "rehearse": ("rehearse", "command"),
     "passes": ("coming_passes", "command"),
+    "plan": ("pass_plan_command", "command"),
     "schedule": ("schedule_command", "command"),
     "pause": ("schedule_command", "pause"),
     "check": ("check", "command"),

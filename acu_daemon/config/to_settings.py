@@ -9,6 +9,7 @@ from acu_daemon.config.satellite_tables import SatelliteFile, UncertaintySection
 from acu_daemon.config.station_tables import StationFile
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.axis_watch import Bounds
+from acu_daemon.pointing.keyhole import KeyholeRules
 
 
 def driver_of(station: StationFile) -> AcuDriver:
@@ -45,6 +46,14 @@ def control_config(
         clock_alarm_deg=station.safety.clock_alarm_beam_fraction * station.receiver.beamwidth_deg,
         following=Bounds(station.safety.following_error_deg, station.safety.following_error_s),
     )
+
+
+def keyhole_rules(station: StationFile) -> KeyholeRules:
+    """What the antenna can do near the zenith, and what counts as better there."""
+    bounds = station.bounds
+    half_beam_deg = station.receiver.beamwidth_deg / 2.0
+    max_el_deg = min(bounds.elevation.max_deg, 90.0)
+    return KeyholeRules(bounds.azimuth, max_el_deg, half_beam_deg, station.tracking.zenith_objective)
 
 
 def estimator_settings(station: StationFile, satellite: SatelliteFile | None) -> EstimatorSettings:

@@ -72,6 +72,7 @@ class PassPlan:
     learned_count: int = 0  # turns of the azimuth that were learned before it was made
     unwindings: tuple[Unwinding, ...] = ()  # where no turn holds the whole pass: changes of the turn within it
     crossing: ZenithCrossing | None = None  # of the zenith, by the elements
+    zenith_turn: int = 0  # 1 or -1: the azimuth rises or falls past the zenith, whichever way the path does; 0: as it
     hidden_tai_s: tuple[tuple[float, float], ...] = ()  # when it is behind the skyline, by its elements
 
 

@@ -193,6 +193,7 @@ class Background:
             horizon_s=max(min(self._horizon_s + PAST_S + past_s + ahead_s, known_s), LEAST_HORIZON_S),
             now_tai_s=now_tai_s,
             near_az_deg=self._near_az_deg(now_tai_s),
+            zenith_turn=self._area.sky.plan.zenith_turn if self._area.sky.plan else 0,
             in_hand=self._in_hand(now_tai_s),
         )
 

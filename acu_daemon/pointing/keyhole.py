@@ -28,6 +28,9 @@ MARGIN = 0.98  # of the drive's rate and acceleration: with all of them the serv
 SAFE_BEAM, SAFE_SHARE = 0.9, 0.25  # where seconds decide, those beyond this share of half a beam count so much more
 SURE_GAIN = 0.8  # of the largest error of a way in hand: a better one close before the zenith has to be so much better
 LEAST_GAIN_DEG = 0.05
+NEAR_STEPS = 20
+SIDE_STEPS = 120
+LEAST_TURN_DEG = 120.0  # of a path past the zenith, for the azimuth to go the other way round
 LATE_S = 0.5  # a departure that is chosen anew is at least so far ahead
 COARSE_STEPS, MOST_STARTS = 4, 80  # half steps from departure to departure in the first look, and how many at most
 LEAST_AHEAD_S = 2.0  # a way of a slow path, or a fast drive, takes longer than its half turn
@@ -100,7 +103,8 @@ def follow_path(
     if beyond.size == 0:
         return path, None
     fastest = int(np.argmax(np.abs(path.az_rate_deg_s)))
-    sign = 1.0 if path.az_rate_deg_s[fastest] >= 0.0 else -1.0
+    by_deg = path.az_deg[min(fastest + NEAR_STEPS, path.az_deg.size - 1)] - path.az_deg[max(fastest - NEAR_STEPS, 0)]
+    sign = 1.0 if by_deg >= 0.0 else -1.0  # not the rate's, where the azimuth goes the other way round
     turned = SkyPath(sign * path.az_deg, path.el_deg, sign * path.az_rate_deg_s, path.el_rate_deg_s, path.step_s)
     best, begun_way = _search(turned, rules, int(beyond[0]), fastest), None
     if begun is not None:
@@ -115,6 +119,23 @@ def follow_path(
         window, (start_az, start_rate), turned_az, turned_rate = followed
         az, rate, start = sign * turned_az, sign * turned_rate, (sign * start_az, sign * start_rate)
     return _result(path, rules, az, rate, window, start)
+
+
+def turned_past_zenith(az_deg: Array, az_rate_deg_s: Array, sign: int) -> Array:
+    """The same directions with an azimuth that rises (sign 1) or falls (-1) past the zenith.
+
+    A path that does not come so near to it that both ways are half a turn is left as it is.  (N,), continuous but for
+    the sample after the fastest, where the other way begins.
+    """
+    top = int(np.argmax(np.abs(az_rate_deg_s)))
+    first, last = max(top - SIDE_STEPS, 0), min(top + SIDE_STEPS, az_deg.size - 1)
+    turned_deg = float(az_deg[last] - az_deg[first])
+    if turned_deg * sign >= 0.0 or abs(turned_deg) < LEAST_TURN_DEG:
+        return az_deg
+    turned = az_deg.copy()
+    middle = first + int(np.argmax(np.abs(az_deg[first : last + 1] - az_deg[first]) >= abs(turned_deg) / 2.0))
+    turned[middle:] += 360.0 * sign
+    return turned
 
 
 def _beyond(path: SkyPath, azimuth: AxisLimits) -> npt.NDArray[np.int64]:

@@ -39,6 +39,10 @@ class TurnPlan:
     offset_deg: float
     unwindings: tuple[Unwinding, ...]
 
+    @property
+    def unwinding_s(self) -> float:
+        return sum(one.for_s for one in self.unwindings)
+
 
 @dataclass(frozen=True, slots=True)
 class TurnAsk:

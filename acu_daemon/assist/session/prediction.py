@@ -9,7 +9,7 @@ from acu_daemon.model import FitResult, Prediction, PredictionKind, Site, Zenith
 from acu_daemon.orbit.frames import enu_from_itrs, station_itrs_m
 from acu_daemon.orbit.look import Look, look_along
 from acu_daemon.orbit.propagator import Propagator
-from acu_daemon.pointing.keyhole import Begun, KeyholeRules, SkyPath, follow_path
+from acu_daemon.pointing.keyhole import Begun, KeyholeRules, SkyPath, follow_path, turned_past_zenith
 from acu_daemon.units import DEG, EARTH_RATE_RAD_S, Array, wrap_180, wrap_180_array
 
 
@@ -26,6 +26,7 @@ def predict(
     lead_in_s: float = 0.0,
     keyhole: KeyholeRules | None = None,
     in_hand: ZenithCrossing | None = None,
+    zenith_turn: int = 0,
     fit: FitResult | None = None,
 ) -> Prediction:
     """Predict pointing from start_tai_s over horizon_s.
@@ -35,6 +36,7 @@ def predict(
     the antenna can do that follows the registers (None: all); its path is made from lead_in_s before the start on, so
     that a buffer that starts inside the keyhole continues what the one before it planned.  in_hand: the crossing of the
     zenith that the antenna is about to begin, is on, or has made (pointing.keyhole).
+    zenith_turn: 1 or -1 where the azimuth has to rise or fall past the zenith because of its stops (0: as it does).
     fit: what corrected the propagator; its biases and its place of the station are in the prediction, and its
     covariance gives sigma_deg.
     Raises:  OrbitError: the propagator has no answer for one of the times.
@@ -46,6 +48,8 @@ def predict(
     tai_s = start_tai_s + step_s * np.arange(-before, round(horizon_s / step_s) + 1, dtype=np.float64)
     seen = encoder_look(propagator, tai_s, site, fit, look_along)
     az_deg = _continuous(seen.az_deg, seen.az_rate_deg_s, step_s)
+    if zenith_turn:
+        az_deg = turned_past_zenith(az_deg, seen.az_rate_deg_s, zenith_turn)
     near = min(max(before + round((made_at_tai_s - start_tai_s) / step_s), before), tai_s.size - 1)
     az_deg += near_az_deg + wrap_180(float(seen.az_deg[near]) - near_az_deg) - az_deg[near]
     path = SkyPath(az_deg, seen.el_deg, seen.az_rate_deg_s, seen.el_rate_deg_s, step_s)

@@ -70,6 +70,7 @@ class RefitRequest:
     horizon_s: float
     now_tai_s: float
     near_az_deg: float  # picks the turn of the azimuth at the start of the buffer
+    zenith_turn: int = 0  # past the zenith the azimuth rises (1), falls (-1), or as the path does
     in_hand: ZenithCrossing | None = None  # the crossing of the zenith that the antenna is on, or is about to begin
 
 
@@ -270,6 +271,7 @@ def predict_from(setup: RefitSetup, fit: FitResult | None, request: RefitRequest
         lead_in_s=longest_window_s(setup.azimuth),
         keyhole=setup.keyhole,
         in_hand=request.in_hand,
+        zenith_turn=request.zenith_turn,
         fit=fit,
     )
     what = (setup.propagator, setup.site, setup.settings)

@@ -13,10 +13,11 @@ from acu_daemon.control.tracking.approach import ACQUIRE_LEAD_S, way_s
 from acu_daemon.control.tracking.state_table import AUTOTRACKING, TrackState
 from acu_daemon.model import AxisLimits, Pass, Site, ZenithCrossing
 from acu_daemon.orbit.propagator import Propagator
-from acu_daemon.pointing.keyhole import KeyholeRules, longest_window_s
+from acu_daemon.pointing.keyhole import KeyholeRules, longest_window_s, turned_past_zenith
 from acu_daemon.pointing.reach import OutOfReach, out_of_reach
-from acu_daemon.pointing.turn_plan import TurnAsk, plan_turns
+from acu_daemon.pointing.turn_plan import TurnAsk, TurnPlan, plan_turns
 from acu_daemon.pointing.wrap import choose_turn, judged, middle_deg
+from acu_daemon.units import Array
 
 STEERED = AUTOTRACKING | {TrackState.PROGRAM}
 COARSE_STEP_S, MOST_STEPS = 0.5, 20000  # of these a tenth of a second's work, in the loop
@@ -51,13 +52,31 @@ def plan_pass(
     is_seen = np.ones(tai_s.size, dtype=np.bool_)
     for from_tai_s, to_tai_s in coming.hidden_tai_s:
         is_seen &= (tai_s < from_tai_s) | (tai_s > to_tai_s)
-    turns = plan_turns(
-        TurnAsk(
-            *(tai_s, az_deg, is_seen, azimuth, present_az_deg, now_tai_s),
-            way_s=partial(way_s, axis=azimuth),
-            is_either_way=lambda offset_deg: judged(offset_deg, az_deg, look.el_deg, azimuth).holds_either_way,
+
+    def on_turns(az_deg: Array) -> TurnPlan:
+        ask = (tai_s, az_deg, is_seen, azimuth, present_az_deg, now_tai_s)
+        return plan_turns(
+            TurnAsk(
+                *ask,
+                way_s=partial(way_s, axis=azimuth),
+                is_either_way=lambda offset_deg: judged(offset_deg, az_deg, look.el_deg, azimuth).holds_either_way,
+            )
         )
-    )
+
+    def crossing_of(az_deg: Array, zenith_turn: int) -> ZenithCrossing | None:
+        return _crossing(propagator, site, coming, (tai_s, az_deg), keyhole, zenith_turn)
+
+    turns, zenith_turn = on_turns(az_deg), 0
+    crossing = crossing_of(az_deg + turns.offset_deg, 0)
+    if turns.unwindings and crossing is not None:
+        rising = 1 if az_deg[-1] > az_deg[0] else -1
+        other_az_deg = turned_past_zenith(az_deg, np.gradient(az_deg, step_s), -rising)
+        is_crossing = (tai_s > crossing.departure_tai_s) & (tai_s < crossing.return_tai_s)
+        other_az_deg[is_crossing] = np.interp(tai_s[is_crossing], tai_s[~is_crossing], other_az_deg[~is_crossing])
+        others = on_turns(other_az_deg)
+        other = crossing_of(other_az_deg + others.offset_deg, -rising)
+        if not others.unwindings and other is not None and other.lost_s < crossing.lost_s + turns.unwinding_s:
+            turns, zenith_turn, crossing, az_deg = others, -rising, other, other_az_deg
     turn = judged(turns.offset_deg, az_deg, look.el_deg, azimuth)
     return PassPlan(
         rise_tai_s=coming.rise_tai_s,
@@ -70,22 +89,34 @@ def plan_pass(
         learned_count=learned_count,
         hidden_tai_s=coming.hidden_tai_s,
         unwindings=turns.unwindings,
-        crossing=_crossing(propagator, site, coming, start_tai_s, keyhole),
+        crossing=crossing,
+        zenith_turn=zenith_turn,
     )
 
 
 def _crossing(
-    propagator: Propagator, site: Site, coming: Pass, start_tai_s: float, keyhole: KeyholeRules | None
+    propagator: Propagator,
+    site: Site,
+    coming: Pass,
+    path: tuple[Array, Array],
+    keyhole: KeyholeRules | None,
+    zenith_turn: int,
 ) -> ZenithCrossing | None:
-    """How the zenith will be crossed, by the elements; None where the drive can follow, or it is past."""
+    """How the zenith will be crossed, by the elements; None where the drive can follow, or it is past.
+
+    path: times and azimuths of what is planned, on its turn.
+    """
     if keyhole is None or coming.culmination_el_deg < LEAST_KEYHOLE_EL_DEG:
         return None
     around_s = 2.0 * longest_window_s(keyhole.azimuth)
     first_tai_s = coming.culmination_tai_s - around_s
-    if coming.culmination_tai_s < start_tai_s or around_s > MOST_AROUND_S:
+    if coming.culmination_tai_s < path[0][0] or around_s > MOST_AROUND_S:
         return None
     buffer = predict(
-        *(propagator, site, first_tai_s, first_tai_s, "TLE", 0.0), horizon_s=2.0 * around_s, keyhole=keyhole
+        *(propagator, site, first_tai_s, first_tai_s, "TLE", float(np.interp(first_tai_s, *path))),
+        horizon_s=2.0 * around_s,
+        keyhole=keyhole,
+        zenith_turn=zenith_turn,
     )
     return buffer.crossing
 
