@@ -11,7 +11,7 @@ from acu_daemon.model import AxisLimits, Pointing, Site, Station, sky_angle_deg
 from acu_daemon.pointing.axis import AxisState
 from acu_daemon.pointing.envelope import Envelope
 from acu_daemon.pointing.keep_out import KeepOut, Sun
-from acu_daemon.pointing.way_round import LEAST_CLEAR_DEG, moved_out, next_aim
+from acu_daemon.pointing.way_round import LEAST_CLEAR_DEG, moved_out, next_aim, why_not_stow
 
 AZIMUTH, ELEVATION = AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0)
 SUN = Sun(Site(Station("", 25.0, 10.0, 100.0)), 5.0)
@@ -131,3 +131,12 @@ def test_where_no_zone_is_in_the_way_the_goal_is_aimed_at_and_a_place_outside_st
     assert moved_out(BY_SUN, (0.0, 10.0), MORNING) == (0.0, 10.0)
     all_over = Envelope(AZIMUTH, ELEVATION, (KeepOut("everything", 0.0, 0.0, 0.0, 90.0),))
     assert moved_out(all_over, (0.0, 45.0), MORNING) is None
+
+
+def test_stow_is_sent_only_where_its_straight_way_keeps_clear() -> None:
+    envelope = Envelope(AZIMUTH, ELEVATION, (KeepOut("the mast", 80.0, 100.0, 10.0, 90.0),), stow_deg=(0.0, 88.0))
+    assert why_not_stow(envelope, (20.0, 30.0), MORNING) == ""
+    said = why_not_stow(envelope, (150.0, 20.0), MORNING)
+    assert said == "the straight way to the stow position leads through the keep-out of the mast"
+    assert "is not known" in why_not_stow(BY_SUN, (20.0, 30.0), MORNING)
+    assert why_not_stow(Envelope(AZIMUTH, ELEVATION), (20.0, 30.0), MORNING) == ""

@@ -166,3 +166,16 @@ def test_an_antenna_that_is_found_inside_the_sun_is_led_out_and_to_the_path() ->
     assert min(angles[out:]) > RADIUS_DEG
     assert not events_named(flight, "fence.refused")
     assert flight.states()[-1].startswith("AUTOTRACK")
+
+
+def test_a_stow_whose_way_leads_through_the_sun_is_an_alarm() -> None:
+    state, config = standing()
+    az_deg, el_deg = state.intake.az_deg, state.intake.status.el_deg
+    envelope = replace(config.envelope, stow_deg=(az_deg + 30.0, el_deg + 1.0))
+    stowing = remembering(
+        state, status=replace(state.intake.status, mode=AcuMode.STOWING, az_deg=az_deg - 15.0), az_deg=az_deg - 15.0
+    )
+    seen = look_around(stowing, STANDS_TAI_S + 1200.0, replace(config, envelope=envelope))
+    assert seen.alarm == "the straight way to the stow position leads through the keep-out of the sun"
+    clear = replace(envelope, stow_deg=(az_deg - 30.0, 80.0))
+    assert look_around(stowing, STANDS_TAI_S + 1200.0, replace(config, envelope=clear)).alarm == ""

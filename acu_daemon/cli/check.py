@@ -55,7 +55,8 @@ from acu_daemon.orbit.sun import RISEN_EL_DEG, sun_direction_deg
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.orbit.visibility import why_none
 from acu_daemon.pointing.outage import kept_out, sun_outages
-from acu_daemon.pointing.wrap import middle_deg
+from acu_daemon.pointing.way_round import why_not_stow
+from acu_daemon.pointing.wrap import middle_deg, nearest_turn
 from acu_daemon.units import DAY_S, wrap_180
 
 ACU_S = 3.0  # for all that is asked of it: a reply or two may be lost
@@ -354,6 +355,11 @@ async def _acu(station: StationFile) -> list[Finding]:
         await link.close()
         clock.close()
     findings = list(_acu_findings(status, identity, faults))
+    bounds = station.bounds
+    az_deg = nearest_turn(status.az_deg, middle_deg(bounds.azimuth), bounds.azimuth)
+    if bounds.stow_deg is not None and az_deg is not None:
+        why = why_not_stow(bounds, (az_deg, status.el_deg), system_tai_s())
+        findings.append(Finding(WARN if why else GO, "way to stow", why or "clear from where the antenna stands"))
     if port.failed_exchange_count:
         late = f" {port.late_count} came too late, {port.lateness}:" if port.late_count else ""
         lost = f"{port.failed_exchange_count} had no answer in time;{late} look at the line, `latency-test` measures it"

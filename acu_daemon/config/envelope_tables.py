@@ -102,8 +102,8 @@ class EnvelopeSection(Section):
         ge=-720,
         le=720,
         description=(
-            "Where the ACU's own stow position is, encoder frame; left out: not known.  Decides whether STOW may be "
-            "sent: where the straight way to it keeps clear."
+            "Where the ACU's own stow position is, encoder frame; left out: not known.  Decides whether a straight "
+            "way to it that leads through a keep-out is told."
         ),
     )
     stow_el_deg: float | None = Field(
@@ -118,6 +118,11 @@ class EnvelopeSection(Section):
         if (self.stow_az_deg is None) != (self.stow_el_deg is None):
             raise ValueError("expected stow_az_deg and stow_el_deg both, or neither")
         return self
+
+    @property
+    def stow_deg(self) -> tuple[float, float] | None:
+        both = self.stow_az_deg, self.stow_el_deg
+        return None if both[0] is None or both[1] is None else (both[0], both[1])
 
     @property
     def skyline(self) -> Skyline | None:

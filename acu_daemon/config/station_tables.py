@@ -238,4 +238,5 @@ class StationFile(Section):
             self.envelope.sun(self.site),
             self.envelope.skyline,
             None if (mount := self.mount.mount()) == Mount() else mount,
+            self.envelope.stow_deg,
         )

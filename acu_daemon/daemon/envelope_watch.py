@@ -6,12 +6,13 @@ there the register limiter keeps it clear.  Everywhere else nothing is moved, an
 
 from dataclasses import dataclass
 
+from acu_daemon.acu.commands import AcuMode
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tracking.state_table import ACTIVE
 from acu_daemon.control.tracking.zone_watch import antenna_nears
 from acu_daemon.pointing.escape import sun_reaches_s, way_out
-from acu_daemon.pointing.way_round import Place
+from acu_daemon.pointing.way_round import Place, why_not_stow
 
 SHOWN_S = 600.0  # a way out is shown from so long before
 
@@ -61,6 +62,8 @@ def _alarm(
         return ""
     if (zone := envelope.zone_at(state.intake.az_deg, status.el_deg, now_tai_s)) is not None:
         return f"the antenna is within the keep-out of {zone.name}, and the daemon does not move it: {why}"
+    if status.mode is AcuMode.STOWING and envelope.stow_deg is not None:
+        return why_not_stow(envelope, (state.intake.az_deg, status.el_deg), now_tai_s)
     if antenna_nears(state, now_tai_s, envelope):
         return f"the antenna moves towards a keep-out, and not by the daemon: the ACU is in {status.mode.name}"
     return ""

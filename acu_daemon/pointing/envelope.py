@@ -33,6 +33,7 @@ class Envelope:
     sun: Sun | None = None  # None: nobody cares
     skyline: Skyline | None = None
     mount: Mount | None = None  # None: the encoders show the beam's direction
+    stow_deg: tuple[float, float] | None = None  # where the ACU's own stow position is; None: not known
 
     @property
     def has_zones(self) -> bool:

@@ -25,6 +25,16 @@ TURN_DEG = 10.0  # half of what a way around a disc turns about its middle from 
 SIDES_DEG = (0, *(sign * angle for angle in range(10, 181, 10) for sign in (1, -1)))  # about a disc, the nearest first
 
 
+def why_not_stow(envelope: Envelope, here: Place, tai_s: float) -> str:
+    """Why the ACU must not be sent to its stow position, which it goes to straight; empty: it may."""
+    if not envelope.has_zones:
+        return ""
+    if envelope.stow_deg is None:
+        return "where the stow position is, is not known: give [envelope] stow_az_deg and stow_el_deg"
+    blocked = blocked_at(envelope, here, envelope.stow_deg, tai_s)
+    return f"the straight way to the stow position leads through the keep-out of {blocked[1].name}" if blocked else ""
+
+
 def blocked_at(
     envelope: Envelope, here: Place, there: Place, tai_s: float, only: Zone | None = None
 ) -> tuple[Place, Zone] | None:
