@@ -41,6 +41,12 @@ from acu_daemon.pointing.mount import Mount
 from acu_daemon.pointing.way_round import RIM_DEG
 
 SITES = tuple(Site(Station("", latitude_deg, 10.0, 100.0)) for latitude_deg in (-75.0, -30.0, 0.0, 25.0, 52.0, 70.0))
+SUNS = tuple(
+    Sun(site, radius_deg, policy)
+    for site in SITES
+    for radius_deg in (0.5, 2.0, 5.0, 15.0)
+    for policy in ("avoid", "avoid", "warn")
+)
 DAY_TAI_S = 8.4e8
 RANGES = ((-270.0, 270.0), (0.0, 360.0), (-180.0, 180.0), (-400.0, 400.0), (-100.0, 150.0))
 MOVERS = ("path", "search", "jump", "rest", "garbage", "unfollowed")
@@ -81,7 +87,7 @@ def an_envelope(draw: Random) -> Envelope:
         az_deg, low_deg = draw.uniform(0.0, 360.0), draw.choice((-90.0, draw.uniform(0.0, 60.0)))
         high_deg = draw.choice((90.0, draw.uniform(max(low_deg, 0.0) + 0.5, 89.0)))
         boxes.append(KeepOut(f"box {number}", az_deg, az_deg + draw.uniform(0.5, 120.0), low_deg, high_deg))
-    sun = Sun(draw.choice(SITES), draw.choice((0.5, 2.0, 5.0, 15.0)), draw.choice(("avoid", "avoid", "warn")))
+    sun = draw.choice(SUNS)
     mount = draw.choice((None, None, Mount(ia_deg=draw.uniform(-90.0, 90.0), an_deg=0.05, tf_deg=0.1)))
     return Envelope(azimuth, elevation, tuple(boxes), sun, None, mount)
 

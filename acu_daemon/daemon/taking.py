@@ -36,8 +36,18 @@ def take_snapshot(
     seen = _seen(area, foreground, port, control, now_tai_s, is_rehearsal=is_rehearsal, files_alarm=files_alarm)
     state, coming = area.state, subject.coming
     off, late_s, half_beam_deg = off_path(state, area.sky), seen.along_s or 0.0, control.beamwidth_deg / 2
+    around = look_around(state, now_tai_s, control)
+    is_behind = not seen.is_acquired and is_hidden(area.sky, now_tai_s, control)
+    until_tai_s = hidden_until_tai_s(area.sky, now_tai_s) if is_behind else None
     seen = replace(
         seen,
+        sun_deg=around.sun_deg,
+        sun_reach_s=around.sun_reach_s,
+        way_out_az_deg=around.way_out[0] if around.way_out else None,
+        way_out_el_deg=around.way_out[1] if around.way_out else None,
+        envelope_alarm=around.alarm,
+        is_hidden=is_behind,
+        hidden_s=None if until_tai_s is None else until_tai_s - now_tai_s,
         utc=utc_text(now_tai_s, 1),
         satellite=subject.satellite,
         station=subject.station,
@@ -58,18 +68,6 @@ def take_snapshot(
         rise_in_s=coming.rise_tai_s - now_tai_s if coming else None,
         set_in_s=coming.set_tai_s + late_s - now_tai_s if coming else None,
         culmination_deg=coming.culmination_el_deg if coming else None,
-    )
-    if not seen.is_acquired and is_hidden(area.sky, now_tai_s, control):
-        until_tai_s = hidden_until_tai_s(area.sky, now_tai_s)
-        seen = replace(seen, is_hidden=True, hidden_s=None if until_tai_s is None else until_tai_s - now_tai_s)
-    around = look_around(state, now_tai_s, control)
-    seen = replace(
-        seen,
-        sun_deg=around.sun_deg,
-        sun_reach_s=around.sun_reach_s,
-        way_out_az_deg=around.way_out[0] if around.way_out else None,
-        way_out_el_deg=around.way_out[1] if around.way_out else None,
-        envelope_alarm=around.alarm,
     )
     return replace(seen, verdict=verdict(seen).word)
 

@@ -10,10 +10,11 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from acu_daemon.model import Site, sky_angle_deg
+from acu_daemon.model import Site
 from acu_daemon.orbit.sun import sun_direction_deg
 from acu_daemon.units import DEG
 
+Vector = tuple[float, float, float]
 Policy = Literal["avoid", "warn", "off"]
 NODE_S = 60.0  # the sun between two of these: a chord of 0.25 deg, 0.0002 deg off its arc
 WHOLE_TURN_DEG = 360.0
@@ -99,32 +100,40 @@ class Disc:
         return degrees(atan2(cos(el) * sin(d_az), sin(el) * cos(el0) - cos(el) * sin(el0) * cos(d_az)))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Sun:
-    """The sun as a site sees it, apparent in the air of its antenna, and what is kept clear of it."""
+    """The sun as a site sees it, apparent in the air of its antenna, and what is kept clear of it.
+
+    One object for one site: it is looked up by identity, ten times a second.
+    """
 
     site: Site
     radius_deg: float
     policy: Policy = "avoid"
 
-    def __hash__(self) -> int:
-        return hash((self.site.station.longitude_deg, self.radius_deg))
-
     def direction_deg(self, tai_s: float) -> tuple[float, float]:
         """Azimuth and apparent elevation at an instant."""
-        first = tai_s // NODE_S
-        share = tai_s / NODE_S - first
-        x0, y0, z0 = _toward(self, int(first))
-        x1, y1, z1 = _toward(self, int(first) + 1)
-        x, y, z = x0 + (x1 - x0) * share, y0 + (y1 - y0) * share, z0 + (z1 - z0) * share
-        return degrees(atan2(x, y)), degrees(atan2(z, sqrt(x * x + y * y)))
+        x, y, z = self._toward(tai_s)
+        return atan2(x, y) / DEG, atan2(z, sqrt(x * x + y * y)) / DEG
 
     def at(self, tai_s: float) -> Disc:
+        """What is kept clear of it at an instant."""
         return _disc(self, tai_s)
 
     def angle_deg(self, az_deg: float, el_deg: float, tai_s: float) -> float:
         """Between the sun's middle and a direction."""
-        return sky_angle_deg(*self.direction_deg(tai_s), az_deg, el_deg)
+        x, y, z = self._toward(tai_s)
+        a, h = az_deg * DEG, el_deg * DEG
+        flat = cos(h)
+        x, y, z = x - flat * sin(a), y - flat * cos(a), z - sin(h)
+        return 2.0 * asin(min(1.0, sqrt(x * x + y * y + z * z) / 2.0)) / DEG
+
+    def _toward(self, tai_s: float) -> tuple[float, float, float]:
+        """East, north, up: nearly a unit vector."""
+        node = tai_s // NODE_S
+        share = tai_s / NODE_S - node
+        (x0, y0, z0), (x1, y1, z1) = _nodes(self, int(node))
+        return x0 + (x1 - x0) * share, y0 + (y1 - y0) * share, z0 + (z1 - z0) * share
 
 
 @lru_cache(maxsize=4)
@@ -134,10 +143,12 @@ def _disc(sun: Sun, tai_s: float) -> Disc:
 
 
 @lru_cache(maxsize=4096)
-def _toward(sun: Sun, node: int) -> tuple[float, float, float]:
-    """East, north, up at a node of time."""
-    az_deg, el_deg = (float(angle[0]) for angle in sun_direction_deg(np.array([node * NODE_S]), sun.site))
+def _nodes(sun: Sun, node: int) -> tuple[Vector, Vector]:
+    """East, north, up at a node of time and at the next one."""
+    az_deg, el_deg = sun_direction_deg(NODE_S * np.array([node, node + 1.0]), sun.site)
     if sun.site.antenna is not None:
-        el_deg = float(sun.site.antenna.apparent_el_deg(el_deg, np.inf))
-    az, el = radians(az_deg), radians(el_deg)
-    return cos(el) * sin(az), cos(el) * cos(az), sin(el)
+        el_deg = sun.site.antenna.apparent_el_deg(el_deg, np.inf)
+    az, el = az_deg * DEG, el_deg * DEG
+    toward = np.stack([np.cos(el) * np.sin(az), np.cos(el) * np.cos(az), np.sin(el)], axis=-1)
+    (x0, y0, z0), (x1, y1, z1) = toward.tolist()
+    return (x0, y0, z0), (x1, y1, z1)
