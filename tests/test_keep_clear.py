@@ -1,10 +1,15 @@
 """Commands stay outside of keep-out zones and the sun's disc, go around them, and one axis does not hold the other."""
 
+from dataclasses import replace
 from math import cos, radians
+from random import Random
 
+import numpy as np
 import pytest
 from envelope_property import DAY_TAI_S, STEP_S, Counts, a_state, try_all
+from troubled_decision import TroubledDecision
 
+from acu_daemon.acu.commands import PointAndPoll, PointAt
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.tracking.register_limiter import limit
 from acu_daemon.model import AxisLimits, Pointing, Site, Station, sky_angle_deg
@@ -140,3 +145,23 @@ def test_stow_is_sent_only_where_its_straight_way_keeps_clear() -> None:
     assert said == "the straight way to the stow position leads through the keep-out of the mast"
     assert "is not known" in why_not_stow(BY_SUN, (20.0, 30.0), MORNING)
     assert why_not_stow(Envelope(AZIMUTH, ELEVATION), (20.0, 30.0), MORNING) == ""
+
+
+@pytest.mark.parametrize("seed", [1, 3, 12, 14, 15, 27])
+def test_a_whole_decision_in_troubles_writes_nothing_inside_and_leads_an_antenna_out(seed: int) -> None:
+    """Signal, modes, faults, axes and people as they come: a box stands on the satellite's path."""
+    decision, draw = TroubledDecision(seed), Random(seed)
+    az_deg, el_deg, _, _ = (float(one[0]) for one in decision.star.place(np.array([draw.uniform(5.0, 25.0)])))
+    width_deg, height_deg = draw.uniform(0.5, 6.0), draw.uniform(0.5, 6.0)
+    top_deg = min(90.0, el_deg + height_deg)
+    box = KeepOut("the mast", az_deg - width_deg, az_deg + width_deg, el_deg - height_deg, top_deg)
+    envelope = replace(decision.config.envelope, keep_outs=(box,))
+    decision.config = replace(decision.config, envelope=envelope)
+    for state, orders in decision.run(300):
+        now_tai_s, status = decision.given[-1].now_tai_s, state.intake.status
+        assert not [event for event in orders.events if event.name == "fence.refused"]
+        for command in (orders.first, orders.extra):
+            if isinstance(command, PointAndPoll | PointAt) and status is not None:
+                antenna_deg = envelope.clearance_deg(state.intake.az_deg, status.el_deg, now_tai_s)
+                clear_deg = envelope.clearance_deg(command.az_deg, command.el_deg, now_tai_s)
+                assert clear_deg >= 0.0 or antenna_deg < 0.1

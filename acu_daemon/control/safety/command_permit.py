@@ -82,16 +82,18 @@ def _of_kind(command: Command, state: ControlState, now_tai_s: float, config: Co
 
 
 def _of_write(az_deg: float, el_deg: float, state: ControlState, now_tai_s: float, config: ControlConfig) -> str:
-    """An antenna that is within a keep-out may be led out of it, or stay; never further in."""
+    """An antenna within a keep-out may be led out of it, or stay; never further in than it or its registers are."""
     envelope, status = config.envelope, state.intake.status
     refused = of_angles(az_deg, el_deg, now_tai_s, envelope, config.acu.angle_step_deg)
     if not refused or not envelope.has_zones or status is None or not isfinite(az_deg + el_deg):
         return refused
     if envelope.beyond_limits(az_deg, el_deg, config.acu.angle_step_deg):
         return refused
-    antenna_deg = envelope.clearance_deg(state.intake.az_deg, status.el_deg, now_tai_s)
-    is_out = antenna_deg < DEEPER_DEG and envelope.clearance_deg(az_deg, el_deg, now_tai_s) >= antenna_deg - DEEPER_DEG
-    return "" if is_out else refused
+    antenna_deg = least_deg = envelope.clearance_deg(state.intake.az_deg, status.el_deg, now_tai_s)
+    if state.registers.in_force is not None:
+        least_deg = min(antenna_deg, envelope.clearance_deg(*state.registers.in_force[1:], now_tai_s))
+    is_out = envelope.clearance_deg(az_deg, el_deg, now_tai_s) >= least_deg - DEEPER_DEG
+    return "" if antenna_deg < DEEPER_DEG and is_out else refused
 
 
 def of_angles(az_deg: float, el_deg: float, now_tai_s: float, envelope: Envelope, step_deg: float) -> str:
