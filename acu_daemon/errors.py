@@ -11,6 +11,7 @@ AcuDaemonError
 ├── OrbitError              a propagator has no answer (decayed, outside its span)
 ├── LinkError               the connection to the ACU failed
 │   └── LinkRefusedError    another client holds the ACU, or nobody listens
+├── NoDaemonError           no daemon runs where one was asked
 └── NoAcuError              no good poll within the start's time limit; exit status 3
 """
 
@@ -57,6 +58,10 @@ class LinkError(AcuDaemonError):
 
 class LinkRefusedError(LinkError):
     """The ACU's side closed at once or refused: another client holds it, or nobody listens."""
+
+
+class NoDaemonError(AcuDaemonError):
+    """No daemon runs where one was asked; the message says how to choose or to start one."""
 
 
 class NoAcuError(AcuDaemonError):

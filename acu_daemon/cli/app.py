@@ -47,6 +47,7 @@ COMMANDS = {  # name: module of acu_daemon.cli, and the function in it
     "disarm": ("operator_commands", "disarm"),
     "clear": ("operator_commands", "clear"),
     "status": ("operator_commands", "status"),
+    "wait": ("wait", "command"),
 }
 GROUPS: dict[str, Group] = {
     "elements": Group(

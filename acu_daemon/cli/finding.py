@@ -7,13 +7,13 @@ from acu_daemon.cli.options import antenna_of
 from acu_daemon.config.load import load_station
 from acu_daemon.edge.control_socket import is_answered, no_daemon
 from acu_daemon.edge.state_directory import StateOwner, choice_text, folders_in, state_path
-from acu_daemon.errors import AcuDaemonError
+from acu_daemon.errors import AcuDaemonError, NoDaemonError
 
 
 def find_daemon(word: str, config: Path | None, state: Path | None, *, is_rehearsal: bool) -> Path:
     """The folder of the daemon in the state directory: the configuration's, else the only one that runs.
 
-    AcuDaemonError: none, or several; says how to choose, by commands that work as they are printed.
+    NoDaemonError: none; AcuDaemonError: several; says how to choose, by commands that work as they are printed.
     """
     antenna = None if config is None else antenna_of(load_station(config))
     directory = state_path(state, is_rehearsal=is_rehearsal)
@@ -26,12 +26,12 @@ def find_daemon(word: str, config: Path | None, state: Path | None, *, is_rehear
         raise AcuDaemonError("\n".join([f"{what}; name the one you mean:", *_commands(word, running)]))
     others = _running(state_path(state, is_rehearsal=not is_rehearsal))
     if not others:
-        raise AcuDaemonError(no_daemon(directory))
+        raise NoDaemonError(no_daemon(directory))
     kind = "a rehearsal does, and is" if not is_rehearsal else "one that is no rehearsal does, and is"
     choice = choice_text(config, state, is_rehearsal=not is_rehearsal)
     is_found_so = len(others) == 1 and config is None
     commands = [f"  acu-daemon {word} {choice}".rstrip()] if is_found_so else _commands(word, others)
-    raise AcuDaemonError("\n".join([f"{no_daemon(directory)}; {kind} asked by:", *commands]))
+    raise NoDaemonError("\n".join([f"{no_daemon(directory)}; {kind} asked by:", *commands]))
 
 
 def _of_antenna(running: list[Path], antenna: StateOwner, directory: Path) -> list[Path]:

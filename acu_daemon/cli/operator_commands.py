@@ -1,17 +1,16 @@
 """`acu-daemon arm`, `disarm`, `clear`, `status`: a person's word to the running daemon, over its control socket."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from acu_daemon.cli.asking import asked_snapshot
 from acu_daemon.cli.finding import find_daemon
 from acu_daemon.daemon.overview import status_lines
-from acu_daemon.daemon.snapshot import snapshot_of
 from acu_daemon.edge.control_socket import ask
+from acu_daemon.edge.rich_loading import let_rich_load
 from acu_daemon.edge.state_directory import choice_text, with_choice
-from acu_daemon.errors import AcuDaemonError
 
 State = Annotated[
     Path | None,
@@ -73,20 +72,24 @@ def status(
     as_json: Annotated[
         bool, typer.Option("--json", help="One line of JSON, with every figure; docs/status.md tells each key.")
     ] = False,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Go on showing it, redrawn twice a second, until Ctrl-C.")
+    ] = False,
 ) -> None:
     """Print what the running daemon does: the verdict, alarms, the pass, where the antenna points, the prediction.
 
-    `watch -n1 acu-daemon status` is a live view; scripts take --json.
+    --watch is a live view, and goes on through a restart of the daemon; scripts take --json, or `acu-daemon wait`.
 
     Exit status: 0; 1 no daemon or no permission.
     """
-    answer = ask(find_daemon("status", config, state, is_rehearsal=rehearsal), "status")
     if as_json:
-        typer.echo(answer)
+        typer.echo(ask(find_daemon("status", config, state, is_rehearsal=rehearsal), "status"))
         return
-    try:
-        seen = snapshot_of(json.loads(answer))
-    except (ValueError, TypeError) as error:
-        raise AcuDaemonError(f"the daemon runs another version than this command ({error}); see --json") from None
-    text = "\n".join(status_lines(seen))
+    if watch:
+        let_rich_load()
+        from acu_daemon.cli.status_watch import watch_status  # slow to load, and no other command needs it
+
+        watch_status(lambda: asked_snapshot(config, state, is_rehearsal=rehearsal))
+        return
+    text = "\n".join(status_lines(asked_snapshot(config, state, is_rehearsal=rehearsal)))
     typer.echo(with_choice(text, choice_text(config, state, is_rehearsal=rehearsal)))

@@ -8,7 +8,7 @@ from pathlib import Path
 from acu_daemon.daemon.snapshot import Snapshot, snapshot_of
 from acu_daemon.edge.control_socket import SOCKET, ask
 from acu_daemon.edge.state_directory import state_path
-from acu_daemon.errors import AcuDaemonError, UsageError
+from acu_daemon.errors import AcuDaemonError, NoDaemonError, UsageError
 
 SERVICES = Path("/var/lib/acu-daemon")  # StateDirectory= of the service
 
@@ -42,7 +42,7 @@ def find_daemon(acu: str, state: Path | None) -> OwnDaemon | None:
 
 def _listens(directory: Path, error: Exception) -> bool:
     """Whether somebody is there all the same; nobody listens at a socket that a killed daemon left."""
-    return "no daemon runs" not in str(error) and str(directory) in str(error)
+    return not isinstance(error, NoDaemonError) and str(directory) in str(error)
 
 
 def _directories(state: Path | None) -> Iterator[Path]:

@@ -10,26 +10,64 @@ OLD_S = 1.0  # a reading older than this is not where the antenna is
 
 def status_lines(seen: Snapshot) -> list[str]:
     """Lines for a terminal; a figure that is not known is left out, or said to be unknown."""
-    said = verdict(seen)
-    since = f" for {words.clock_text(seen.state_s)}" if seen.state_s is not None else ""
-    lines = [f"{said.word}{since}: {said.why}"]
+    lines = [headline(seen)]
     if mark := words.marks(seen):
         lines.append(mark)
     lines += [f"ALARM       {text}" for text in alarms(seen)]
+    return [*lines, *(f"{name:11} {text}" for name, text in status_rows(seen))]
+
+
+def headline(seen: Snapshot) -> str:
+    """The verdict, since when, and why."""
+    said = verdict(seen)
+    since = f" for {words.clock_text(seen.state_s)}" if seen.state_s is not None else ""
+    return f"{said.word}{since}: {said.why}"
+
+
+def status_rows(seen: Snapshot) -> list[tuple[str, str]]:
+    """Name and text of each row, the most wanted first; rows without anything to say are left out."""
     rows = (
         ("time", seen.utc),
         ("satellite", f"{seen.satellite}, over {seen.station}" if seen.station else seen.satellite),
         ("pass", _pass(seen)),
         ("elements", "; ".join(text for text in (seen.elements, seen.elements_problem) if text)),
+        ("steers", steering(seen)),
         ("antenna", _antenna(seen)),
+        ("command", _command(seen)),
         ("path", _path(seen)),
         ("signal", _signal(seen)),
         ("prediction", _prediction(seen)),
+        ("buffer", _buffer(seen)),
         ("control", _control(seen)),
         ("ACU", ", ".join(text for text in (seen.acu, seen.acu_mode if seen.is_link_up else "no link") if text)),
         ("late ticks", f"{seen.skipped_tick_count} of {seen.tick_count + seen.skipped_tick_count} skipped"),
     )
-    return [*lines, *(f"{name:11} {text}" for name, text in rows if text)]
+    return [(name, text) for name, text in rows if text]
+
+
+S = TrackState
+_STEERS = {
+    S.IDLE: "nobody",
+    S.PREPOSITION: "the daemon, to where the pass begins; then autotrack",
+    S.ACQUIRE_TLE: "the daemon, by the elements; autotrack takes over with the signal",
+    S.AUTOTRACK_TLE: "the ACU's autotrack; the elements would take over",
+    S.AUTOTRACK_FITTED: "the ACU's autotrack; this pass's fit would take over",
+    S.PROGRAM: "the daemon, along the predicted path; no signal is waited for",
+    S.HOLD_FITTED: "the daemon, by this pass's fit; autotrack takes over with the signal",
+    S.HOLD_TLE: "the daemon, by the elements; autotrack takes over with the signal",
+    S.SEARCH: "the daemon, around the path; autotrack takes over with the signal",
+    S.ZENITH: "the daemon, past the zenith; then autotrack",
+    S.AVOID: "the daemon, clear of a keep-out; then autotrack",
+    S.MANUAL: "the local panel",
+    S.STOW: "the ACU, to or in the stow position",
+    S.FAULT: "nobody",
+    S.LINK_LOST: "not known: no link",
+}
+
+
+def steering(seen: Snapshot) -> str:
+    """What steers the antenna and what would take over."""
+    return f"{_STEERS[TrackState(seen.state)]} ({seen.state})"
 
 
 def _pass(seen: Snapshot) -> str:
@@ -45,6 +83,17 @@ def _antenna(seen: Snapshot) -> str:
     if not seen.is_link_up or seen.reading_age_s > OLD_S:
         return f"was at {where}; where it is now is not known"
     return where + (f", moving {seen.speed_deg_s:.2f} deg/s" if seen.speed_deg_s is not None else "")
+
+
+def _command(seen: Snapshot) -> str:
+    """What was last written into the command registers."""
+    if seen.command_az_deg is None or seen.command_el_deg is None:
+        return ""
+    return f"az {seen.command_az_deg:.2f} el {seen.command_el_deg:.2f} deg, last written, azimuth over all turns"
+
+
+def _buffer(seen: Snapshot) -> str:
+    return f"{words.buffer(seen).removeprefix('buffer').strip()} ahead" if seen.buffer_kind else ""
 
 
 def _path(seen: Snapshot) -> str:

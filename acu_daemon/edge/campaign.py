@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 
 import joblib
 
+from acu_daemon.edge.rich_loading import let_rich_load
 from acu_daemon.errors import AcuDaemonError, CampaignError, UsageError
 
 CONNECT_S = 10.0
@@ -81,8 +82,7 @@ def progress_bar(what: str) -> Iterator[OnDone | None]:
     if not sys.stderr.isatty():
         yield None
         return
-    if sys.modules.get("rich", sys) is None:
-        del sys.modules["rich"]  # the start keeps it out of commands that need none
+    let_rich_load()
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 

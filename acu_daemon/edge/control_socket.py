@@ -17,7 +17,7 @@ from typing import Any
 import structlog
 
 from acu_daemon.edge.denied import denied
-from acu_daemon.errors import AcuDaemonError, UsageError
+from acu_daemon.errors import AcuDaemonError, NoDaemonError, UsageError
 
 SOCKET = "control.sock"
 MODE = 0o660
@@ -112,7 +112,7 @@ def ask(directory: Path, line: str) -> str:
     except PermissionError:
         raise AcuDaemonError(f"{path}: not permitted; be root (sudo), its user or in its group") from None
     except (FileNotFoundError, NotADirectoryError, ConnectionRefusedError):
-        raise AcuDaemonError(no_daemon(directory)) from None
+        raise NoDaemonError(no_daemon(directory)) from None
     except OSError as error:
         raise AcuDaemonError(f"{path}: the daemon does not answer: {error.strerror or error}") from None
     verdict, _, rest = reply.partition(" ")
