@@ -25,7 +25,7 @@ from acu_daemon.acu.commands import AcuMode, SelectMode, Stop
 from acu_daemon.assist.session.refit import RefitReply, RefitRequest, RefitSetup
 from acu_daemon.cli.kept import open_kept
 from acu_daemon.cli.options import Target, coming_pass
-from acu_daemon.cli.run import make_job
+from acu_daemon.cli.run_setup import make_job
 from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.drivers.sa3842.codec import CommandDecoder, address_byte

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from acu_daemon.cli.options import Target, coming_pass
-from acu_daemon.cli.run import make_job
+from acu_daemon.cli.run_setup import make_job
 from acu_daemon.cli.virtual_pass import events_to
 from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.daemon.snapshot import Snapshot

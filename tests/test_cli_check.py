@@ -17,6 +17,7 @@ from test_live_line import SEEN
 
 from acu_daemon.acu.commands import AcuMode, Identify, Poll, ReadFaults
 from acu_daemon.cli import check, own_daemon
+from acu_daemon.cli.check_finding import NO_GO, Finding
 from acu_daemon.drivers.sa3842.codec import CMD_OF, CommandDecoder, encode_reply
 from acu_daemon.drivers.sa3842.messages import Command, Faults, Identity, Nak, Reply, Status
 from acu_daemon.drivers.sa3842.status_block import decode_status
@@ -465,18 +466,18 @@ def test_a_daemon_that_may_not_be_asked_is_named_and_the_acu_that_it_holds_is_no
     def refuse(directory: Path, _: str) -> str:
         raise AcuDaemonError(f"{directory / SOCKET}: not permitted; be root (sudo), its user or in its group")
 
-    async def held(_: object) -> list[check.Finding]:
-        return [check.Finding(check.NO_GO, "ACU", "tcp://acu:1 was closed at once: another client holds the ACU")]
+    async def held(_: object) -> list[Finding]:
+        return [Finding(NO_GO, "ACU", "tcp://acu:1 was closed at once: another client holds the ACU")]
 
     monkeypatch.setattr(own_daemon, "ask", refuse)
-    monkeypatch.setattr(check, "_acu", held)
+    monkeypatch.setattr(check, "acu_findings", held)
     config = write(tmp_path / "config", STATION, scd=BROUWER)
     done = acu_daemon("check", "--config", config, "--state", tmp_path / "state")
     found = lines(done)
     assert (found["running daemon"][0], found["ACU"][0], done.code) == ("WARN", "WARN", 0)
     assert "be root (sudo)" in found["running daemon"][1]
     monkeypatch.undo()
-    monkeypatch.setattr(check, "_acu", held)
+    monkeypatch.setattr(check, "acu_findings", held)
     alone = acu_daemon("check", "--config", config, "--state", tmp_path / "state")
     assert (alone.code, lines(alone)["ACU"][0]) == (1, "NO-GO")
     assert "name its state directory with --state" in lines(alone)["ACU"][1]

@@ -5,6 +5,7 @@ import shutil
 import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -18,7 +19,7 @@ pytestmark = [
     pytest.mark.skipif(shutil.which("rotctld") is None, reason="needs rotctld: apt-get install libhamlib-utils"),
 ]
 PATIENCE_S = 60.0
-AT = "1989-02-01T01:58:45Z"  # SCD-1 climbs over Cuiaba
+AT = "1989-02-01T01:59:00Z"  # SCD-1 rises over Cuiaba, in the west
 
 
 @contextlib.contextmanager
@@ -47,8 +48,19 @@ def asked(port: int, line: bytes) -> bytes:
         return one.recv(1000)
 
 
+def brought_near(port: int) -> bytes:
+    """The dummy turns at its own pace to where the pass is soon after its rise."""
+    asked(port, b"P -80 8\n")
+    for _ in range(600):
+        said = asked(port, b"p\n")
+        if abs(float(said.split()[0]) + 80.0) < 1.0:
+            return said
+        threading.Event().wait(0.2)
+    raise AssertionError("the dummy rotator does not move")
+
+
 def station(tmp_path: Path, port: int, changed: str = STATION) -> Path:
-    return config_files.write(tmp_path, changed.replace("4533", str(port)).replace("max_deg = 90.0", "max_deg = 90"))
+    return config_files.write(tmp_path, changed.replace("4533", str(port)).replace("max_deg = 450", "max_deg = 180"))
 
 
 def run(config: Path, seconds: float) -> subprocess.Popen[str]:
@@ -63,7 +75,7 @@ def test_a_rehearsal_leads_hamlibs_dummy_along_the_path_and_stops_it(tmp_path: P
     with rotctld(port):
         checked = acu_daemon("check", "--config", config, "--satellite", "scd", "--at", AT)
         assert "Hamlib's dummy rotator SIMULATION" in checked.out
-        before = asked(port, b"p\n")
+        before = brought_near(port)
         out, _ = run(config, 60.0).communicate(timeout=4 * PATIENCE_S)
         assert "PROGRAM" in out
         assert "stop.done" in out
@@ -75,6 +87,7 @@ def test_a_rotctld_that_dies_is_told_and_the_pass_goes_on_when_it_is_back(tmp_pa
     config = station(tmp_path, port)
     with contextlib.ExitStack() as ends:
         first = ends.enter_context(rotctld(port))
+        brought_near(port)
         daemon = run(config, 60.0)
         ends.callback(daemon.kill)
         assert daemon.stdout is not None
@@ -86,6 +99,7 @@ def test_a_rotctld_that_dies_is_told_and_the_pass_goes_on_when_it_is_back(tmp_pa
                 first.wait(PATIENCE_S)
             if "link.lost" in line or "link.closed" in line:
                 ends.enter_context(rotctld(port))
+                brought_near(port)
                 break
         rest, _ = daemon.communicate(timeout=4 * PATIENCE_S)
         assert "link.lost" in "".join(lines)

@@ -17,7 +17,7 @@ import acu_daemon.edge.clock as clock_file
 from acu_daemon.acu.commands import Command
 from acu_daemon.cli.elements_watch import ElementsWatch
 from acu_daemon.cli.options import load_target
-from acu_daemon.cli.run import Prepared, RunSetup, prepare
+from acu_daemon.cli.run_setup import Prepared, RunSetup, prepare
 from acu_daemon.control.state import ControlState
 from acu_daemon.daemon.runs import Runs
 from acu_daemon.daemon.service import Outcome, Service

@@ -17,7 +17,7 @@ import typer
 
 from acu_daemon.acu.commands import AcuMode, Backup, SelectBackup, SelectMode
 from acu_daemon.cli.options import Target, at_acu, coming_pass, load_target, whose_recording
-from acu_daemon.cli.run import make_job
+from acu_daemon.cli.run_setup import make_job
 from acu_daemon.cli.simulated import station_air
 from acu_daemon.daemon.live import LiveLine
 from acu_daemon.daemon.port import AcuPort

@@ -13,10 +13,11 @@ import typer
 from acu_daemon.acu.commands import Poll
 from acu_daemon.acu.driver import AcuDriver
 from acu_daemon.assist.session.refit import RefitRequest, RefitSetup
-from acu_daemon.cli.check import GO, NO_GO, WARN, Finding, clock_finding
+from acu_daemon.cli.check import clock_finding
+from acu_daemon.cli.check_finding import GO, NO_GO, WARN, Finding
 from acu_daemon.cli.options import check_duration, coming_pass, load_target
 from acu_daemon.cli.outputs import refuse_no_picture, refuse_unwritable
-from acu_daemon.cli.run import make_job
+from acu_daemon.cli.run_setup import make_job
 from acu_daemon.config.load import load_station
 from acu_daemon.config.station_tables import StationFile
 from acu_daemon.config.to_settings import driver_of

@@ -8,7 +8,7 @@ import math
 import os
 import sys
 from collections.abc import Coroutine
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,12 +17,8 @@ import structlog
 import typer
 
 from acu_daemon import PROCESS_START_S
-from acu_daemon.assist.estimators.full.carry_over import CarryOver
-from acu_daemon.assist.mount_memory.pedestal_memory import PedestalMemory
-from acu_daemon.assist.session.refit import RefitSetup
 from acu_daemon.cli.clock_wait import wait_for_clock
 from acu_daemon.cli.elements_watch import ElementsWatch
-from acu_daemon.cli.kept import Kept, open_kept
 from acu_daemon.cli.options import (
     At,
     AtMonotonic,
@@ -30,25 +26,24 @@ from acu_daemon.cli.options import (
     Satellite,
     Target,
     antenna_of,
-    at_acu,
     check_duration,
     chosen_acu,
     coming_pass,
-    ending,
     load_target,
     nearest_to_pass,
     whose_recording,
 )
 from acu_daemon.cli.rehearsal import clock_text, meet_in_rehearsal, met_by_chance
+from acu_daemon.cli.run_setup import Prepared, RunSetup, prepare
 from acu_daemon.cli.weather_watch import WeatherWatch
 from acu_daemon.config.load import load_station
-from acu_daemon.config.to_settings import control_config, driver_of, estimator_settings
+from acu_daemon.config.to_settings import driver_of
 from acu_daemon.control.state import ControlState
 from acu_daemon.daemon.background import fit_deadline_s
 from acu_daemon.daemon.health import Health
 from acu_daemon.daemon.live import LiveLine
 from acu_daemon.daemon.runs import Runs
-from acu_daemon.daemon.service import Outcome, PassJob, Service
+from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.edge.clock import STEP_S, SystemClock
 from acu_daemon.edge.control_socket import ControlSocket
@@ -57,19 +52,17 @@ from acu_daemon.edge.elements_fetching import ElementsFetching
 from acu_daemon.edge.elements_store import confirm_doubtful
 from acu_daemon.edge.event_loop import loop_runner
 from acu_daemon.edge.fit import ProcessFitRunner
-from acu_daemon.edge.link import Link, check_rate, make_link
+from acu_daemon.edge.link import check_rate, make_link
 from acu_daemon.edge.logs import configure_logs, tell_dropped, tell_loop_problem, tell_signal
 from acu_daemon.edge.recording import RecordingWriter
 from acu_daemon.edge.rehearsal_clock import Meeting, Role
-from acu_daemon.edge.scheduling import keep_to_this_thread, scheduling_text
+from acu_daemon.edge.scheduling import keep_to_this_thread
 from acu_daemon.edge.signals import STOPS, take_signals
 from acu_daemon.edge.state_directory import SnapshotFile, antenna_directory, choice_text, older_folders, state_directory
 from acu_daemon.edge.systemd import Notifier
 from acu_daemon.edge.writer import QueuedStream, Writer
 from acu_daemon.errors import AcuDaemonError
-from acu_daemon.model import Pass
 from acu_daemon.orbit.timescales import utc_text
-from acu_daemon.units import DAY_S
 
 STDERR = 2
 SNAPSHOT_TICKS = 5  # where no live line is drawn: a snapshot costs a tenth of a tick
@@ -216,62 +209,6 @@ def _confirm(config: Path, target: Target, epoch_tai_s: float) -> None:
             confirm_doubtful(config / section.store, norad_id, epoch_tai_s)
 
 
-@dataclass(frozen=True, slots=True)
-class RunSetup:
-    """What stays the same from one run of this process to the next.
-
-    end_s: of --duration, on CLOCK_MONOTONIC.  older: other folders of the same antenna's state.  acu: URL of --acu.
-    """
-
-    config: Path
-    name: str
-    clock: SystemClock
-    link: Link
-    directory: Path
-    files: Writer
-    end_s: float
-    is_shadow: bool
-    older: tuple[Path, ...] = ()
-    acu: str | None = None
-
-    @property
-    def folders(self) -> tuple[Path, ...]:
-        """The antenna's own folder first."""
-        return (self.directory, *self.older)
-
-
-@dataclass(frozen=True, slots=True)
-class Prepared:
-    """A run that can begin."""
-
-    target: Target
-    job: PassJob
-    kept: Kept
-
-
-def prepare(frame: RunSetup, target: Target, memory: ControlState | None = None) -> Prepared:
-    """Find the pass and what was left for it.  memory: of the run before, where this one begins anew.
-
-    Raises: UsageError: no pass is coming, or the elements do not cover it.
-    """
-    clock, target = frame.clock, at_acu(target, frame.acu)
-    coming = coming_pass(target, clock.tai_s())
-    _announce(target, coming, clock, is_shadow=frame.is_shadow)
-    kept = open_kept(frame.directory, target, coming, clock, frame.files, frame.older)
-    job = make_job(
-        target,
-        coming,
-        frame.link,
-        is_rehearsal=clock.is_rehearsal,
-        end_tai_s=clock.tai_s() + frame.end_s - clock.monotonic_s(),
-        carried=kept.carried,
-        memory=kept.memory,
-    )
-    job = replace(job, control=replace(job.control, is_shadow=frame.is_shadow))
-    job = replace(job, state=kept.state if memory is None else memory, is_anew=memory is not None)
-    return Prepared(target, job, kept)
-
-
 def _watched(runner: asyncio.Runner, run: Coroutine[Any, Any, Outcome]) -> Outcome:
     """Run it.  AcuDaemonError: the system denied something in mid-run, so that a supervisor starts the daemon again."""
     try:
@@ -280,76 +217,6 @@ def _watched(runner: asyncio.Runner, run: Coroutine[Any, Any, Outcome]) -> Outco
         if words := denied(error):
             raise AcuDaemonError(f"the system denies what the run needs: {words}") from error
         raise
-
-
-def make_job(
-    target: Target,
-    coming: Pass,
-    link: Link,
-    *,
-    is_rehearsal: bool,
-    end_tai_s: float = math.inf,
-    carried: CarryOver | None = None,
-    memory: PedestalMemory | None = None,
-) -> PassJob:
-    """What the files say, as the daemon needs it."""
-    station = target.station
-    driver = driver_of(station)
-    return PassJob(
-        refit=RefitSetup(
-            target.elements.propagator,
-            station.site,
-            station.tracking.estimator,
-            estimator_settings(station, target.satellite),
-            station.acu.azimuth.limits(),
-            carried=carried,
-            zenith_objective=station.tracking.zenith_objective,
-            memory=memory,
-        ),
-        control=replace(control_config(station, target.satellite, driver, link.byte_time_s), is_rehearsal=is_rehearsal),
-        coming=coming,
-        horizon_s=station.tracking.horizon_s,
-        low_water_s=station.tracking.low_water_s,
-        driver=driver,
-        device_delay_s=station.acu.device_delay_s,
-        is_rehearsal=is_rehearsal,
-        end_tai_s=end_tai_s,
-        satellite=target.satellite.satellite.name,
-        station=station.station.name,
-        elements=f"{target.elements.propagator.kind} of {utc_text(target.elements.epoch_tai_s, 0)}",
-    )
-
-
-def _announce(target: Target, coming: Pass, clock: SystemClock, *, is_shadow: bool) -> None:
-    log: Any = structlog.get_logger("run")
-    log.info(
-        "run.start",
-        satellite=target.elements.label,
-        station=target.station.station.name,
-        acu=target.station.acu.url,
-        elements=target.elements.propagator.kind,
-        estimator=target.station.tracking.estimator,
-        elements_age_days=round((clock.tai_s() - target.elements.epoch_tai_s) / 86400.0, 2),
-        rise=utc_text(coming.rise_tai_s, 0),
-        set=utc_text(coming.set_tai_s, 0),
-        culmination_deg=round(coming.culmination_el_deg, 1),
-        scheduling=scheduling_text(),
-    )
-    for warning in target.elements.warnings:
-        log.warning("elements.warning", reason=warning)
-    if air := target.station.atmosphere.told(target.station.site.station):
-        log.info("run.air", air=air)
-    if target.earth.about:
-        log.info("earth.orientation", age=target.earth.about)
-    if target.elements.choice:
-        log.info("elements.chosen", reason=target.elements.choice)
-    if until := ending(target, coming.set_tai_s + DAY_S):
-        log.warning("elements.ending", reason=until)
-    if is_shadow:
-        log.warning("run.shadow", reason="--shadow: nothing is written to the ACU, whatever happens")
-    elif target.station.safety.arm == "manual":
-        reason = '[safety] arm = "manual": nothing is written to the ACU until `acu-daemon arm`'
-        log.warning("run.disarmed", reason=reason)
 
 
 async def _run(

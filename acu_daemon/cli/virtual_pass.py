@@ -15,7 +15,7 @@ from acu_daemon.assist.mount_memory.pedestal_memory import PedestalMemory
 from acu_daemon.assist.mount_memory.whole_pass import PassEstimate
 from acu_daemon.assist.session.refit import RefitSetup
 from acu_daemon.cli.options import Target, coming_pass
-from acu_daemon.cli.run import make_job
+from acu_daemon.cli.run_setup import make_job
 from acu_daemon.cli.simulated import station_air
 from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.daemon.snapshot import Snapshot
