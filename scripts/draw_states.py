@@ -28,6 +28,7 @@ ROUND = (
     S.AUTOTRACK_TLE,
     S.AUTOTRACK_FITTED,
     S.ZENITH,
+    S.FALSE_LOCK,
     S.HOLD_FITTED,
     S.SEARCH,
     S.HOLD_TLE,
@@ -35,7 +36,7 @@ ROUND = (
 COLOURS = {
     S.IDLE: "#555555", S.PREPOSITION: "#8a6d00", S.ACQUIRE_TLE: "#b34700", S.AUTOTRACK_TLE: "#2e7d32",
     S.AUTOTRACK_FITTED: "#006064", S.HOLD_FITTED: "#1a4fa3", S.HOLD_TLE: "#6a1b9a", S.SEARCH: "#b0003a",
-    S.ZENITH: "#5d4037",
+    S.ZENITH: "#5d4037", S.FALSE_LOCK: "#c62828",
 }  # fmt: skip
 OTHER_COLOUR = "#555555"
 NAMES: tuple[tuple[str, Set[TrackState]], ...] = (

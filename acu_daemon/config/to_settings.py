@@ -38,6 +38,8 @@ def control_config(
         search_along_s=station.tracking.search_along_s,
         search_across_deg=station.tracking.search_across_deg,
         zenith_takeover=station.tracking.zenith_takeover,
+        leave_false_lock=station.tracking.leave_false_lock,
+        false_lock_s=station.tracking.false_lock_s,
         is_armed=station.safety.arm == "auto",
         register_watchdog_s=station.safety.register_watchdog_s if driver.capabilities.has_register_watchdog else 0.0,
         acu=driver.capabilities,

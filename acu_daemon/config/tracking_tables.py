@@ -123,6 +123,19 @@ class TrackingSection(Section):
             "Decides how much of an overhead pass is lost."
         ),
     )
+    leave_false_lock: bool = Field(
+        default=False,
+        description=(
+            "Whether a lock of autotrack far off a good fit (a side lobe, another satellite, the sun) is left: REMOTE "
+            "back onto the prediction, and autotrack again from there.  Decides whether a false lock lasts."
+        ),
+    )
+    false_lock_s: float = Field(
+        default=3.0,
+        ge=1,
+        le=60,
+        description="How long it must be off without a break.  Decides how soon it is left.",
+    )
     zenith_objective: Literal["largest_error", "seconds"] = Field(
         default="largest_error",
         description=(

@@ -30,6 +30,8 @@ class ControlConfig:
     search_along_s: float = 10.0
     search_across_deg: float = 2.0
     zenith_takeover: ZenithTakeover = "fitted"
+    leave_false_lock: bool = False
+    false_lock_s: float = 3.0
     is_armed: bool = True  # at the start; later as people arm and disarm
     is_shadow: bool = False  # commands nothing, whatever happens
     is_resting: bool = False  # between passes: polls, and commands nothing

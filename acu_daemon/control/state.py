@@ -222,6 +222,15 @@ class Search:
 
 
 @dataclass(frozen=True, slots=True)
+class FalseLock:
+    """What autotrack holds beside the satellite.  Owner: control.tracking.false_lock."""
+
+    since_tai_s: float | None = None  # off the path without a break
+    count: int = 0  # in this pass
+    is_false: bool = False  # long enough: it is to be left
+
+
+@dataclass(frozen=True, slots=True)
 class Lag:
     """The lag from command to encoder, learned per axis.  Owner: control.tracking.learned_lag."""
 
@@ -249,6 +258,7 @@ class ControlState:
     tracking: Tracking = Tracking()
     signal: Signal = Signal()
     search: Search = Search()
+    false_lock: FalseLock = FalseLock()
     lag: Lag = Lag()
 
     def is_armed(self, config: ControlConfig) -> bool:

@@ -71,6 +71,7 @@ class Snapshot:
     limited_count: int = 0  # writes that were held at a limit
     clamped_count: int = 0  # followed writes that the register limiter held back to what the axes can do
     search: str = ""  # what SEARCH has covered so far
+    false_lock_count: int = 0  # locks that were left because they were not the satellite's
     rejecting: str = ""  # why the newest readings are not fitted
     rejected_counts: dict[str, int] = field(default_factory=dict)  # readings so far, by reason
     utc: str = ""

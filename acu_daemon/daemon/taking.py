@@ -97,6 +97,7 @@ def _seen(
         command_el_deg=state.registers.axis_el.position_deg if state.registers.axis_el else None,
         agc_db=status.agc_db if status else None,
         search=covered_text(state.search.scan, prediction, control) if state.search.scan.rows else "",
+        false_lock_count=state.false_lock.count,
         is_acquired=state.tracking.track is not TrackState.LINK_LOST and reading is not None and reading.is_locked,
         miss_deg=None if state.tracking.track is TrackState.LINK_LOST else _miss_deg(reading, prediction),
         along_s=sky.fit.along_s if sky.fit else None,

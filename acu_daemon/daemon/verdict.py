@@ -54,6 +54,9 @@ def verdict(seen: Snapshot) -> Verdict:
         return _before(seen)
     if state in AUTOTRACKING:
         return _tracking(seen)
+    if state is S.FALSE_LOCK:
+        why = "autotrack held something else than the satellite: the antenna goes back to the path"
+        return Verdict("FALSE LOCK", Level.WATCH, why)
     if state is S.ZENITH:
         return Verdict("OVER ZENITH", Level.CALM, "the azimuth drive cannot follow here: the antenna is led past it")
     if state is S.AVOID:

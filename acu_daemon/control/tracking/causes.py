@@ -24,6 +24,7 @@ RESUME_DEG = 5.0  # an antenna this near to the path goes on from an interruptio
 BEFORE = frozenset({TrackState.IDLE, TrackState.PREPOSITION})  # only there it matters where the antenna stands
 TO_AUTOTRACK = frozenset({Cause.ON_POINT, Cause.ON_POINT_FITTED, Cause.STILL_FITTED, Cause.STILL_SELECTED})
 TAKEOVER_S, GIVE_BACK_S = 2.0, 0.5  # before the departure, and after the return: a crossing of the zenith
+LEAVING_S = 15.0  # after a false lock; then autotrack is selected wherever the antenna is
 CHANGED_S = 3.0  # by which a fit may put off a crossing that the antenna was taken over for
 TAKEOVER_RATES = 1.2  # of the drive's rate: what autotrack cannot follow
 MODE_SETTLE_S = 3.0  # a selected mode takes a moment to show; only later is a left mode the ACU's own doing
@@ -44,6 +45,7 @@ def find_causes(state: ControlState, given: TickInput, config: ControlConfig) ->
         causes |= _of_plan(state, status, given, config)
         causes |= _of_time(state, status, given, config)
         causes |= _of_zenith(state, given, config)
+        causes |= _of_false_lock(state, status, given, config)
         causes = _of_zones(causes, state, given, config)
     return causes
 
@@ -55,6 +57,17 @@ def _of_zones(causes: set[Cause], state: ControlState, given: TickInput, config:
     if not nears_zone(state, given.sky, given.now_tai_s, config):
         return causes | {Cause.KEEP_OUT_PAST}
     return causes - TO_AUTOTRACK | {Cause.KEEP_OUT}
+
+
+def _of_false_lock(state: ControlState, status: AcuStatus, given: TickInput, config: ControlConfig) -> set[Cause]:
+    """Whether what autotrack holds is to be left, or has been."""
+    causes = {Cause.LOCK_FALSE} if state.false_lock.is_false else set()
+    if state.tracking.track is TrackState.FALSE_LOCK:
+        path = path_point(given.sky, given.now_tai_s)
+        is_on = path is not None and _distance_deg(state, status, path) < ON_POINT_BEAMS * config.beamwidth_deg
+        if is_on or given.now_tai_s - state.tracking.entered_tai_s > LEAVING_S:
+            causes.add(Cause.BACK_ON_PATH)
+    return causes
 
 
 def _of_zenith(state: ControlState, given: TickInput, config: ControlConfig) -> set[Cause]:

@@ -22,6 +22,7 @@ class TrackState(StrEnum):
     HOLD_TLE = "HOLD/TLE"
     SEARCH = "SEARCH"
     ZENITH = "ZENITH"
+    FALSE_LOCK = "FALSE-LOCK"
     AVOID = "AVOID"
     MANUAL = "MANUAL"
     STOW = "STOW"
@@ -61,6 +62,8 @@ class Cause(StrEnum):
     MODE_LEFT = "the ACU left the mode by itself (power cycle, or another hand)"
     ACQUIRE_OVER = "no signal within acquire_s"
     HOLD_OVER = "no signal within hold_s"
+    LOCK_FALSE = "autotrack holds something else than the satellite: it is left for the prediction"
+    BACK_ON_PATH = "the antenna is back on the path"
     ZENITH_NEAR = "the azimuth drive cannot follow over the zenith: the antenna is led past it"
     ZENITH_PAST = "the antenna is past the zenith"
     ZENITH_PAST_FITTED = "the antenna is past the zenith, on the path of this pass's fit"
@@ -71,14 +74,14 @@ class Cause(StrEnum):
 S = TrackState
 ACTIVE = frozenset(
     {
-        *(S.PREPOSITION, S.PROGRAM),
+        *(S.PREPOSITION, S.PROGRAM, S.FALSE_LOCK),
         *(S.ACQUIRE_TLE, S.AUTOTRACK_TLE, S.AUTOTRACK_FITTED, S.HOLD_FITTED, S.HOLD_TLE, S.SEARCH, S.ZENITH, S.AVOID),
     }
 )
 TRACKING = ACTIVE - {S.PREPOSITION, S.AVOID}
 HOLDING = frozenset({S.HOLD_FITTED, S.HOLD_TLE})
 AUTOTRACKING = frozenset({S.AUTOTRACK_TLE, S.AUTOTRACK_FITTED})
-LED = frozenset({S.PREPOSITION, S.PROGRAM, S.ZENITH, S.AVOID})  # by the registers alone: autotrack is not selected
+LED = frozenset({S.PREPOSITION, S.PROGRAM, S.ZENITH, S.FALSE_LOCK, S.AVOID})  # autotrack is not selected
 ANY = frozenset(TrackState)
 NO_LINK = frozenset({S.LINK_LOST})
 
@@ -125,7 +128,9 @@ TABLE: tuple[Row, ...] = (
     Row(frozenset({S.ZENITH}), Cause.ZENITH_PAST_FITTED, S.HOLD_FITTED, "0.5 s after the return"),
     Row(frozenset({S.ZENITH}), Cause.ZENITH_PAST, S.HOLD_TLE, "0.5 s after the return"),
     Row(frozenset({S.AUTOTRACK_FITTED}), Cause.FIT_LEFT, S.AUTOTRACK_TLE),
-    Row(frozenset({S.HOLD_FITTED}), Cause.FIT_LEFT, S.HOLD_TLE),
+    Row(frozenset({S.HOLD_FITTED, S.FALSE_LOCK}), Cause.FIT_LEFT, S.HOLD_TLE),
+    Row(frozenset({S.AUTOTRACK_FITTED}), Cause.LOCK_FALSE, S.FALSE_LOCK, "false_lock_s off the path"),
+    Row(frozenset({S.FALSE_LOCK}), Cause.BACK_ON_PATH, S.HOLD_FITTED, "on the path, or 15 s"),
     Row(frozenset({S.ACQUIRE_TLE, S.SEARCH}), Cause.ACQUIRED_FITTED, S.AUTOTRACK_FITTED),
     Row(frozenset({S.ACQUIRE_TLE, S.SEARCH, S.HOLD_TLE}), Cause.ACQUIRED, S.AUTOTRACK_TLE),
     Row(frozenset({S.SEARCH}), Cause.HIDDEN_FITTED, S.HOLD_FITTED),
