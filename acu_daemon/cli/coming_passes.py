@@ -19,13 +19,16 @@ from acu_daemon.cli.options import (
     open_ends,
     parse_utc,
 )
+from acu_daemon.cli.outputs import refuse_no_picture
 from acu_daemon.config.load import load_station, satellite_names
+from acu_daemon.config.station_tables import StationFile
 from acu_daemon.control.tracking.pass_plan import beyond_limits
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.errors import AcuDaemonError, OrbitError, UsageError
 from acu_daemon.model import Pass
+from acu_daemon.orbit.look import apparent_at
 from acu_daemon.orbit.passes import find_passes
-from acu_daemon.orbit.propagator import is_ephemeris, spans_tai_s
+from acu_daemon.orbit.propagator import Propagator, is_ephemeris, spans_tai_s
 from acu_daemon.orbit.selection import nearest_epoch_tai_s
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.orbit.visibility import why_none
@@ -33,6 +36,7 @@ from acu_daemon.pointing.outage import KeptOut, SunOutage, kept_out, sun_outages
 from acu_daemon.pointing.reach import OutOfReach
 from acu_daemon.units import DAY_S
 
+MOST_TRACKS, TRACK_POINTS = 12, 200  # of a picture
 ROW = "{name:16} {rise:19}  {duration:>8}  {rise_az:>6}  {culmination:>6}  {culmination_az:>6}  {set_az:>6}"
 
 
@@ -45,6 +49,7 @@ class _Seen:
     beyond: dict[Pass, tuple[OutOfReach, ...]]  # when which axis cannot follow
     sun: dict[Pass, tuple[SunOutage, ...]]  # when it is near the sun
     zones: dict[Pass, tuple[KeptOut, ...]]  # when it is in a keep-out zone
+    propagators: dict[Pass, Propagator]  # what each is computed from
     why_none: str
     said: list[str]
 
@@ -67,6 +72,15 @@ def command(
             "elements it is computed from.",
         ),
     ] = False,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            "--plot",
+            metavar="FILE",
+            help="Also draw the sky with mask, keep-out zones, the sun and the passes, the first twelve: .png, .svg, "
+            ".pdf.",
+        ),
+    ] = None,
 ) -> None:
     """Show the passes above the station's lowest elevation: rise, duration, culmination, set.
 
@@ -79,6 +93,7 @@ def command(
     A satellite whose files or elements cannot be used is left out with its reason, the others are shown; exit status 2
     where none is left.
     """
+    refuse_no_picture(plot)
     start_tai_s = SystemClock().tai_s() if start is None else parse_utc("--from", start)
     end_tai_s = start_tai_s + days * DAY_S
     names = [satellite] if satellite is not None else satellite_names(config)
@@ -99,11 +114,31 @@ def command(
         for name, reason in omitted.items():
             typer.echo(f"warning: {name} is left out: {'; '.join(reason.splitlines())}", err=True)
     _show(seen, omitted, start_tai_s, end_tai_s, as_json=as_json)
+    if plot is not None and seen:
+        _plot(plot, load_station(config), seen)
     if not seen:
         [(name, reason), *others] = omitted.items()
         if others:
             raise UsageError(f"no satellite of {config}/satellites can be used")
         raise UsageError(reason if satellite is not None else f"{name} is left out: {reason}")
+
+
+def _plot(path: Path, station: StationFile, seen: dict[str, _Seen]) -> None:
+    """The sky with the first passes.  UsageError: the picture cannot be written."""
+    from acu_daemon.report.sky_plot import SkyTrack, plot_sky  # matplotlib is slow to load
+
+    rows = [(name, one, of.propagators[one]) for name, of in seen.items() for one in of.passes]
+    tracks = []
+    for name, one, propagator in sorted(rows, key=lambda row: row[1].rise_tai_s)[:MOST_TRACKS]:
+        tai_s = np.linspace(one.rise_tai_s, one.set_tai_s, TRACK_POINTS)
+        look = apparent_at(propagator, tai_s, station.site)
+        label = f"{name} {utc_text(one.rise_tai_s, 0)[5:16].replace('T', ' ')}"
+        tracks.append(SkyTrack(label, tai_s, look.az_deg, look.el_deg))
+    lowest_deg = station.station.min_elevation_deg
+    try:
+        plot_sky(path, station.bounds, tracks, lowest_deg, f"The sky over {station.station.name}")
+    except OSError as error:
+        raise UsageError(f"--plot {path}: {error.strerror}") from None
 
 
 def _search(config: Path, name: str, start_tai_s: float, end_tai_s: float) -> _Seen:
@@ -142,6 +177,7 @@ def _search(config: Path, name: str, start_tai_s: float, end_tai_s: float) -> _S
         beyond,
         {one: sun_outages(of, site, bounds.sun, one) for one, of in of_pass.items()},
         {one: kept_out(of, site, bounds.keep_outs, one) for one, of in of_pass.items()},
+        of_pass,
         "" if is_told else why_none(propagator, site, start_tai_s, end_tai_s, lowest_deg),
         said,
     )
