@@ -26,7 +26,7 @@ from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.axis_watch import AWAY_S, AxesWatch, AxisSeen, Bounds, Duty, watch_axes
 from acu_daemon.control.safety.encoder_watch import EncoderWatch, watch_encoders
 from acu_daemon.control.safety.status_plausibility import CONTRADICTING_COUNT, MOVED_COUNT
-from acu_daemon.control.safety.turn import BIT_SCORE, DENIED_COUNT, TurnWatch, locate, watch_pull
+from acu_daemon.control.safety.turn import AGAINST_COUNT, BIT_SCORE, TurnWatch, locate, watch_pull
 from acu_daemon.control.startup import WATCHDOG_TRY_S, after_reply
 from acu_daemon.control.state import ControlState, StartStage, Watchdog
 from acu_daemon.control.tick import tick
@@ -206,10 +206,10 @@ def test_wild_azimuths_and_wrong_bits_add_up_only_without_good_ones_between() ->
     watch, az_deg = TurnWatch(), 260.0  # a bearing of 300 deg is reached on the other turn alone
     at = AcuStatus(260.0, 40.0, AcuMode.REMOTE, is_sector_high=True)
     for _ in range(6):
-        for status in [replace(at, az_deg=300.0)] * (DENIED_COUNT - 2) + [at]:
+        for status in [replace(at, az_deg=300.0)] * (AGAINST_COUNT - 2) + [at]:
             watch, az_deg = locate(watch, status, AZIMUTH, az_deg)
             assert az_deg >= 260.0
-        assert watch.denied_count == 0
+        assert watch.against_count == 0
     for _ in range(6):
         for status in [replace(at, is_sector_high=False)] * (BIT_SCORE // 2 - 1) + [at] * BIT_SCORE:
             watch, az_deg = locate(watch, status, AZIMUTH, az_deg)
