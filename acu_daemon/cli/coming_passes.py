@@ -84,6 +84,8 @@ def command(
 ) -> None:
     """Show the passes above the station's lowest elevation: rise, duration, culmination, set.
 
+    Elevations are apparent, in the air of [atmosphere]: at 5 deg a low satellite rises some 3 s sooner.
+
     Where the limits of an axis do not hold a pass, its line says which axis cannot follow, from when, for how long;
     where a hill of `[envelope] mask` hides it in its midst, where it comes near the sun, how near, and where it is in a
     keep-out zone, from when and for how long.
