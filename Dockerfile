@@ -5,6 +5,7 @@ RUN useradd --system --create-home --home-dir /var/lib/acu-daemon --groups dialo
 WORKDIR /opt/acu-daemon
 COPY pyproject.toml constraints.txt README.md LICENSE ./
 COPY acu_daemon acu_daemon
+COPY config config
 RUN pip install --no-cache-dir --constraint constraints.txt .
 USER acu
 ENV STATE_DIRECTORY=/var/lib/acu-daemon

@@ -30,6 +30,7 @@ class Group:
 
 
 COMMANDS = {  # name: module of acu_daemon.cli, and the function in it
+    "init": ("init", "command"),
     "run": ("run", "command"),
     "fake-acu": ("fake_acu", "command"),
     "fault-proxy": ("fault_proxy", "command"),
