@@ -100,6 +100,14 @@ def test_the_files_of_the_demo_are_installed(installed: Installed) -> None:
     assert (config / "scenario.toml").is_file()
 
 
+def test_a_new_station_gets_the_commented_file_that_is_shipped(installed: Installed) -> None:
+    place = ("--name", "X", "--latitude", "1", "--longitude", "2", "--height", "3", "--acu", "serial:///dev/nowhere")
+    axes = ("--azimuth", "0,360,1,1", "--elevation", "0,90,1,1")
+    done = installed.run("acu-daemon", "init", installed.elsewhere / "station", *place, *axes)
+    assert done.returncode == 0, done.stderr
+    assert "# soft limits and drive limits" in (installed.elsewhere / "station" / "station.toml").read_text()
+
+
 def test_the_profiles_of_the_sun_are_installed(installed: Installed) -> None:
     done = installed.run("acu-daemon", "groundtrack", "simulate", "--days", "2", "--navigator", "perfect", "--json")
     assert done.returncode == 0, done.stderr
