@@ -26,14 +26,16 @@ from acu_daemon.config.onboard_tables import (
 from acu_daemon.config.satellite_tables import BrouwerSection, ElementsFileSection, LimitsSection
 from acu_daemon.config.schedule_tables import MaintenanceSection
 from acu_daemon.config.section import Section
+from acu_daemon.config.station_day_tables import HooksSection, WindSection
 from acu_daemon.config.station_tables import SafetySection, StationFile, TimeSection
 from acu_daemon.config.tracking_tables import ReceiverSection, TrackingSection
+from acu_daemon.edge.hooks import Hook
 
 writer = load("write_configuration")
 ROOT = Path(__file__).resolve().parents[1]
 TABLES = [table for model, _ in writer.FILES.values() for table in writer.tables_of(model)]
 KEYS = [pytest.param(key, id=f"{table.name}.{key.name}{table.kind}") for table in TABLES for key in table.keys]
-WITHOUT_UNIT = {"eccentricity", "min_eccentricity", "max_eccentricity"}  # pure numbers
+WITHOUT_UNIT = {"eccentricity", "min_eccentricity", "max_eccentricity", "resume_share"}  # pure numbers
 NUMBERS = (float, float | None)
 
 
@@ -87,6 +89,9 @@ OUT_OF_SAID: dict[str, tuple[type[Section], dict[str, Any]]] = {  # ranges that 
     "TimeSection.earth_orientation": (TimeSection, {"earth_orientation": ""}),
     "MaintenanceSection.from_utc": (MaintenanceSection, {"from_utc": "noon", "to_utc": "2026-01-01T00:00:00Z"}),
     "MaintenanceSection.to_utc": (MaintenanceSection, {"from_utc": "2026-01-01T00:00:00Z", "to_utc": "2026-01-01"}),
+    **{f"HooksSection.{hook}": (HooksSection, {str(hook): "a text"}) for hook in Hook},
+    "WindSection.udp": (WindSection, {"udp": "4841"}),
+    "WindSection.file": (WindSection, {"file": ""}),
     "TrackingSection.low_water_s": (TrackingSection, {"low_water_s": 90.0, "horizon_s": 90.0}),
     "ElementsSourcesSection.source": (ElementsSourcesSection, {"source": "ftp://example.org/gp"}),
     "ElementsSourcesSection.store": (ElementsSourcesSection, {"store": ""}),

@@ -11,7 +11,6 @@ import typer
 from acu_daemon.cli.check_acu import acu_findings
 from acu_daemon.cli.check_finding import GO, NO_GO, WARN, Finding
 from acu_daemon.cli.check_running import held_finding, left_behind, running_finding
-from acu_daemon.cli.check_satellite import satellite_findings
 from acu_daemon.cli.options import (
     Config,
     antenna_of,
@@ -64,7 +63,7 @@ def command(
     """
     now_tai_s = SystemClock().tai_s() if at is None else parse_utc("--at", at)
     worst = GO
-    found = _findings(config, satellite, now_tai_s, state)
+    found = findings(config, satellite, now_tai_s, state)
     for finding in [running_finding(config, state, is_rehearsal=rehearsal)] if running else found:
         typer.echo(f"{finding.verdict:6} {finding.what:22} {'; '.join(finding.detail.splitlines())}")
         if finding.verdict == NO_GO or (finding.verdict == WARN and worst == GO):
@@ -74,7 +73,8 @@ def command(
         raise typer.Exit(1)
 
 
-def _findings(config: Path, satellite: str | None, now_tai_s: float, state: Path | None) -> Iterator[Finding]:
+def findings(config: Path, satellite: str | None, now_tai_s: float, state: Path | None) -> Iterator[Finding]:
+    """Everything that the command shows, a line after the other."""
     try:
         station, earth = at_date(load_station(config), config, now_tai_s)
     except UsageError as error:
@@ -92,7 +92,7 @@ def _findings(config: Path, satellite: str | None, now_tai_s: float, state: Path
         said = "; ".join(text for text in (earth.about, earth.warning) if text)
         yield Finding(WARN if earth.warning else GO, "Earth orientation", said)
     yield from _air(config, station, now_tai_s)
-    yield from sources_findings(config, station.elements, now_tai_s)
+    yield from sourcesfindings(config, station.elements, now_tai_s)
     directory, antenna = state_path(state, is_rehearsal=False), antenna_of(station)
     folders = (antenna.folder(directory), *older_folders(directory, antenna))
     names = [satellite] if satellite else satellite_names(config)
@@ -126,7 +126,7 @@ def _air(config: Path, station: StationFile, now_tai_s: float) -> Iterator[Findi
         yield Finding(WARN if reader.problem else GO, "air", "; ".join(one for one in (air, reader.problem) if one))
 
 
-def sources_findings(config: Path, section: ElementsSourcesSection, now_tai_s: float) -> Iterator[Finding]:
+def sourcesfindings(config: Path, section: ElementsSourcesSection, now_tai_s: float) -> Iterator[Finding]:
     """How the station's sources of elements stand: never a reason not to track, the elements' own age is."""
     for one in standings(config, section, now_tai_s):
         yield Finding(WARN if one.is_problem else GO, "elements source", f"{one.source}: {one.text}")

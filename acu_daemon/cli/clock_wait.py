@@ -16,7 +16,7 @@ LOOK_S = 1.0
 LONGER_US = 10_000_000  # so much longer than now the start may take, said at every look (sd_notify(3))
 
 
-def wait_for_clock(config: Path, satellite: str, clock: SystemClock, until_s: float) -> bool:
+def wait_for_clock(config: Path, satellite: str | None, clock: SystemClock, until_s: float) -> bool:
     """Wait until the system's clock can be right, at most until a reading of CLOCK_MONOTONIC.  False: it is not.
 
     Nothing is told the ACU meanwhile.  A rehearsal has a clock of its own.  What is wrong with files is told later.
@@ -38,11 +38,11 @@ def wait_for_clock(config: Path, satellite: str, clock: SystemClock, until_s: fl
     return True
 
 
-def _wrong(config: Path, satellite: str, clock: SystemClock) -> str:
+def _wrong(config: Path, satellite: str | None, clock: SystemClock) -> str:
     now_tai_s = clock.tai_s()
     if wrong := before_release(now_tai_s):
         return wrong
-    if is_clock_synchronised() is not False:
+    if is_clock_synchronised() is not False or satellite is None:
         return ""
     try:
         elements = load_target(config, satellite, now_tai_s, is_strict=False).elements

@@ -23,7 +23,7 @@ from acu_daemon.cli.options import Target
 from acu_daemon.config.to_settings import estimator_settings, pedestal_text
 from acu_daemon.control.state import ControlState, Held, remembered
 from acu_daemon.edge.carry_over_file import FitKeeper, carry_over_path, read_carry_over
-from acu_daemon.edge.clock import SystemClock
+from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.latch import DISARMED, LATCH, LatchKeeper, read_latch
 from acu_daemon.edge.mount_memory_file import MOUNT, MountKeeper, mount_files, open_mount_file
 from acu_daemon.edge.run_state import RUN_STATE, RunState, RunStateKeeper, read_run_state
@@ -75,19 +75,25 @@ class Kept:
 def open_kept(
     directory: Path,
     target: Target,
-    coming: Pass,
-    clock: SystemClock,
+    coming: Pass | None,
+    clock: Clock,
     files: Writer,
     older: Sequence[Path] = (),
 ) -> Kept:
-    """Read what was left; say in the log what of it is used.  older: other folders of the same antenna."""
+    """Read what was left; say in the log what of it is used.  older: other folders of the same antenna.
+
+    coming None: no pass is on; then of the last one it counts whether the daemon still holds the antenna.
+    """
     source, site, now_tai_s = target.elements.propagator, target.station.site, clock.tai_s()
     clock_s = now_tai_s - clock.monotonic_s() if clock.is_rehearsal else None
     left = read_run_state(_first_with(RUN_STATE, directory, older))
     is_another = left.is_of_another_rehearsal(clock_s)
     latch, disarmed_by = ("" if is_another else read_latch(directory, name, older) for name in (LATCH, DISARMED))
-    is_same_pass = left.is_of(target.elements.label, coming, clock_s)
-    state = _first_state(left if is_same_pass else RunState(), latch, disarmed_by)
+    is_same_pass = coming is not None and left.is_of(target.elements.label, coming, clock_s)
+    if coming is None and not is_another:
+        state = _first_state(RunState(held=left.held, is_stow_kept=left.is_stow_kept), latch, disarmed_by)
+    else:
+        state = _first_state(left if is_same_pass else RunState(), latch, disarmed_by)
     resumed = _resumed(left, target, now_tai_s) if is_same_pass else None
     path = carry_over_path(directory, target.satellite.satellite.norad_id, target.satellite.satellite.name)
     from_path = _first_with(path.name, directory, older) / path.name
@@ -96,15 +102,15 @@ def open_kept(
         pedestal_text(target.station),
         estimator_settings(target.station, target.satellite),
         target.elements.label,
-        coming.rise_tai_s,
+        coming.rise_tai_s if coming else 0.0,
         now_tai_s,
     )
     if mount.memory.pass_count:
         structlog.get_logger("mount").info("mount.used", passes=mount.memory.pass_count, terms=mount.memory.has_mount)
     first = RunState(
-        satellite=target.elements.label,
-        rise_tai_s=coming.rise_tai_s,
-        set_tai_s=coming.set_tai_s,
+        satellite=target.elements.label if coming else "",
+        rise_tai_s=coming.rise_tai_s if coming else 0.0,
+        set_tai_s=coming.set_tai_s if coming else 0.0,
         clock_s=clock_s,
         arming=state.arming.by_people,
         fit=resumed,

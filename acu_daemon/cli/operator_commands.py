@@ -65,6 +65,17 @@ def clear(config: Config = None, state: State = None, rehearsal: Rehearsal = Fal
     _say("clear", config, state, is_rehearsal=rehearsal)
 
 
+def reload(config: Config = None, state: State = None, rehearsal: Rehearsal = False) -> None:
+    """Have a running station (`run` without --satellite) read its files and elements again, between passes.
+
+    A bad file is refused with its reason, in the log, and what was read before stays.  SIGHUP does the same where the
+    station has no terminal.
+
+    Exit status: 0 asked; 1 no daemon, no permission, or it tracks a single satellite.
+    """
+    _say("reload", config, state, is_rehearsal=rehearsal)
+
+
 def status(
     config: Config = None,
     state: State = None,

@@ -23,7 +23,6 @@ from acu_daemon.cli.options import (
     At,
     AtMonotonic,
     Config,
-    Satellite,
     Target,
     antenna_of,
     check_duration,
@@ -35,6 +34,7 @@ from acu_daemon.cli.options import (
 )
 from acu_daemon.cli.rehearsal import clock_text, meet_in_rehearsal, met_by_chance
 from acu_daemon.cli.run_setup import Prepared, RunSetup, prepare
+from acu_daemon.cli.run_station import StationSetup, first_usable, run_station
 from acu_daemon.cli.weather_watch import WeatherWatch
 from acu_daemon.config.load import load_station
 from acu_daemon.config.to_settings import driver_of
@@ -61,7 +61,7 @@ from acu_daemon.edge.signals import STOPS, take_signals
 from acu_daemon.edge.state_directory import SnapshotFile, antenna_directory, choice_text, older_folders, state_directory
 from acu_daemon.edge.systemd import Notifier
 from acu_daemon.edge.writer import QueuedStream, Writer
-from acu_daemon.errors import AcuDaemonError
+from acu_daemon.errors import AcuDaemonError, UsageError
 from acu_daemon.orbit.timescales import utc_text
 
 STDERR = 2
@@ -77,7 +77,14 @@ class LogLevel(StrEnum):
 
 def command(
     config: Config,
-    satellite: Satellite,
+    satellite: Annotated[
+        str | None,
+        typer.Option(
+            "--satellite",
+            help="NAME of satellites/NAME.toml in the config directory.  Without it: the station, all satellites of "
+            "the directory by the schedule, day and night.",
+        ),
+    ] = None,
     at: At = None,
     at_monotonic: AtMonotonic = None,
     duration: Annotated[
@@ -121,7 +128,7 @@ def command(
         bool, typer.Option("--same-antenna", help="The ACU of --acu moves the antenna of station.toml.")
     ] = False,
 ) -> None:
-    """Track a satellite: the pass in progress, else the next one.
+    """Track a satellite: the pass in progress, else the next one.  Without --satellite: the station, pass after pass.
 
     Polls the ACU, writes its registers ten times a second, fits the orbit while the signal is locked and steers by the
     prediction while it is not.  Ends after the pass, after --duration, on SIGTERM or Ctrl-C, with a safe stop.
@@ -158,11 +165,23 @@ def command(
         antenna = antenna_of(load_station(config))
         directory = antenna_directory(base, antenna)
         older = () if clock.is_rehearsal else older_folders(base, antenna)  # nothing is carried between rehearsals
-        target = _load(config, satellite, clock, (directory, *older))
-        coming_pass(target, clock.tai_s())
+        if satellite is None:
+            target = first_usable(config, clock.tai_s())
+        else:
+            target = _load(config, satellite, clock, (directory, *older))
+            coming_pass(target, clock.tai_s())
         _tell_clock(met if clock.is_rehearsal else met_by_chance(url, clock), clock)
         link = make_link(url)
         check_rate(link, driver_of(target.station), target.station.acu.period_s, target.station.acu.device_delay_s)
+        if satellite is None:
+            if record is not None:
+                raise UsageError("--record needs --satellite: of a station with many, a file belongs to one pass")
+            setup = StationSetup(config, clock, link, directory, files, end_s, shadow, older)
+            runner = ends.enter_context(loop_runner())
+            outcome = _watched(runner, run_station(setup, clock, target, live))
+            if not outcome.is_stopped:
+                raise typer.Exit(1)
+            return
         whose = whose_recording(target, is_rehearsal=clock.is_rehearsal)
         recording = None
         if record is not None:
@@ -245,7 +264,7 @@ async def _run(
         if step_s:
             return f"the system clock was set by {step_s:+.1f} s, and nothing is tracked"
         fetching.look()
-        if is_waiting and elements.look(now.job.coming):
+        if is_waiting and elements.look(now.coming):
             return "other elements were taken"
         return "the weather has changed" if is_waiting and weather.look(clock.tai_s()) else ""
 

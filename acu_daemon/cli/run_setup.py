@@ -58,6 +58,7 @@ class Prepared:
     """A run that can begin."""
 
     target: Target
+    coming: Pass
     job: PassJob
     kept: Kept
 
@@ -82,12 +83,12 @@ def prepare(frame: RunSetup, target: Target, memory: ControlState | None = None)
     )
     job = replace(job, control=replace(job.control, is_shadow=frame.is_shadow))
     job = replace(job, state=kept.state if memory is None else memory, is_anew=memory is not None)
-    return Prepared(target, job, kept)
+    return Prepared(target, coming, job, kept)
 
 
 def make_job(
     target: Target,
-    coming: Pass,
+    coming: Pass | None,
     link: Link,
     *,
     is_rehearsal: bool,

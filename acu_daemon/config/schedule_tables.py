@@ -99,10 +99,10 @@ class ScheduleSection(Section):
     post_s: float = Field(
         default=10.0, ge=1, le=3600, description="After each pass, for the safe stop and the hooks.  Decides the same."
     )
-    after: Literal["next", "park", "stow", "stay"] = Field(
+    after: Literal["park", "stay"] = Field(
         default="stay",
         description=(
-            "What the antenna does between passes: wait at the next rise, park, stow, or stay where it is.  Decides "
+            "What the antenna does between passes: park, or stay where it is.  Decides "
             "where the antenna is when nobody looks."
         ),
     )
@@ -111,8 +111,7 @@ class ScheduleSection(Section):
         ge=0,
         le=86400,
         description=(
-            "Where the next pass is nearer than this, the antenna waits at its rise instead of parking or stowing.  "
-            "Decides whether it moves twice."
+            "Where the next pass is nearer than this, the antenna does not park.  Decides whether it moves twice."
         ),
     )
     park_az_deg: float = Field(

@@ -16,6 +16,7 @@ from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.arming import begin_run
 from acu_daemon.control.safety.foreign_stop import release
 from acu_daemon.control.state import ControlState, remembered
+from acu_daemon.control.tick_input import PassPlan
 from acu_daemon.control.tracking.approach import lead_s
 from acu_daemon.control.tracking.pass_plan import is_due, is_tracked, plan_pass, why_over
 from acu_daemon.control.tracking.state_table import ACTIVE
@@ -45,7 +46,7 @@ class PassJob:
 
     refit: RefitSetup
     control: ControlConfig
-    coming: Pass
+    coming: Pass | None  # None: none is known, the daemon rests
     horizon_s: float
     low_water_s: float
     driver: AcuDriver
@@ -56,6 +57,7 @@ class PassJob:
     satellite: str = ""  # names for people
     station: str = ""
     elements: str = ""  # kind and epoch, for people
+    move: PassPlan | None = None  # only go there, before a pass or after it
     is_anew: bool = False  # not the first run of this daemon: the ACU was there
 
 
@@ -188,7 +190,7 @@ class Service:
         self._started_tai_s = self._clock.tai_s()
         async with asyncio.TaskGroup() as inner:
             tasks = [inner.create_task(self._foreground.run(), name="foreground")]
-            if not self._job.control.is_resting:
+            if not self._job.control.is_resting and self._job.move is None:
                 tasks.append(inner.create_task(self._background.run(), name="background"))
             await self._is_over.wait()
             for task in tasks:
@@ -246,6 +248,10 @@ class Service:
     def _plan(self, now_tai_s: float) -> None:
         job, state = self._job, self._area.state
         axes = job.control
+        if job.move is not None:
+            self._background.set_plan(job.move)
+        if job.move is not None or job.coming is None:
+            return
         plan = plan_pass(
             job.refit.propagator,
             job.refit.site,
@@ -334,7 +340,7 @@ class Service:
         return Outcome(
             reason=reason,
             has_acquired=state.signal.has_acquired,
-            has_begun=self._clock.tai_s() > self._job.coming.rise_tai_s,
+            has_begun=self._job.coming is not None and self._clock.tai_s() > self._job.coming.rise_tai_s,
             is_stopped=is_stopped,
             tick_count=foreground.tick_count,
             write_count=foreground.write_count,

@@ -30,6 +30,7 @@ class Clock(Protocol):
     """Seam between the daemon and time.  is_synchronised: of the system clock; None: nobody could tell, or needs to."""
 
     is_synchronised: bool | None
+    is_rehearsal: bool
 
     def monotonic_s(self) -> float: ...
 
@@ -147,6 +148,7 @@ class LoopClock:
     """The running loop's own time, for tests in virtual time: TAI is at_tai_s when the clock is made."""
 
     is_synchronised: bool | None = None
+    is_rehearsal = False
 
     def __init__(self, at_tai_s: float) -> None:
         self._loop = asyncio.get_running_loop()

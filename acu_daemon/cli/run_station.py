@@ -1,0 +1,337 @@
+"""`acu-daemon run` without a satellite: one process for the station's passes, rests and moves."""
+
+import asyncio
+import gc
+import math
+import os
+import signal
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import structlog
+
+from acu_daemon.assist.session.refit import RefitReply, RefitRequest
+from acu_daemon.cli.kept import Kept, open_kept
+from acu_daemon.cli.options import Target, load_target
+from acu_daemon.cli.run_setup import make_job
+from acu_daemon.cli.station_day import MOVE_S, Beside, StationDay, move_to
+from acu_daemon.config.load import satellite_names
+from acu_daemon.control.state import ControlState
+from acu_daemon.control.tracking.approach import Way, way_s
+from acu_daemon.daemon.background import fit_deadline_s
+from acu_daemon.daemon.health import Health
+from acu_daemon.daemon.live import LiveLine
+from acu_daemon.daemon.service import Outcome, PassJob, Service
+from acu_daemon.daemon.snapshot import Snapshot
+from acu_daemon.daemon.stopping import DEADLINE_S
+from acu_daemon.daemon.verdict import STILL_DEG_S
+from acu_daemon.edge.clock import STEP_S, Clock, SystemClock
+from acu_daemon.edge.control_socket import ControlSocket
+from acu_daemon.edge.fit import FitRunner, ProcessFitRunner
+from acu_daemon.edge.hooks import Hook
+from acu_daemon.edge.link import Link
+from acu_daemon.edge.logs import tell_loop_problem, tell_signal
+from acu_daemon.edge.schedule_file import ScheduleFile
+from acu_daemon.edge.signals import take_signals
+from acu_daemon.edge.state_directory import SnapshotFile
+from acu_daemon.edge.systemd import Notifier
+from acu_daemon.edge.writer import Writer
+from acu_daemon.errors import AcuDaemonError, UsageError
+from acu_daemon.model import Pass
+from acu_daemon.schedule.book import Entry
+
+RELOAD = "reload"
+IN_PLACE_DEG = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class StationSetup:
+    """What stays the same while the station runs.  end_s: of --duration, on CLOCK_MONOTONIC."""
+
+    config: Path
+    clock: Clock
+    link: Link
+    directory: Path
+    files: Writer
+    end_s: float
+    is_shadow: bool
+    older: tuple[Path, ...] = ()
+    beside: Beside = asyncio.to_thread
+    check: Callable[[str, float], list[str]] | None = None  # of a satellite at a TAI; None: as `acu-daemon check`
+    make_runner: Callable[[PassJob], FitRunner] = lambda job: ProcessFitRunner(
+        job.refit, fit_deadline_s(job.low_water_s)
+    )
+
+
+class NoFits:
+    """The fit runner of a daemon that rests or moves: nothing is fitted, no process runs."""
+
+    async def refit(self, request: RefitRequest) -> RefitReply:
+        raise RuntimeError(f"nothing is fitted between passes: {request}")
+
+    async def close(self) -> None:
+        """Nothing runs."""
+
+
+def first_usable(config: Path, now_tai_s: float) -> Target:
+    """The first satellite whose files can be used: what a rest is made from.  UsageError: none is, and why."""
+    reasons = []
+    for name in satellite_names(config):
+        try:
+            target = load_target(config, name, now_tai_s)
+        except AcuDaemonError as error:
+            reasons.append(f"{name}: {error}")
+        else:
+            return target
+    what = "\n".join(reasons) or f"{config}/satellites holds no satellite; put a NAME.toml there"
+    raise UsageError(f"no satellite can be used:\n{what}" if reasons else what)
+
+
+class StationRuns:
+    """One run after another, each with the memory of the one before.  Owned by the loop."""
+
+    def __init__(self, setup: StationSetup, first: Target, live: LiveLine | None) -> None:
+        self._setup, self._first, self._live = setup, first, live
+        self.day = StationDay(
+            setup.config,
+            setup.clock,
+            ScheduleFile(setup.directory),
+            first.station,
+            beside=setup.beside,
+            check=setup.check,
+            is_rehearsal=setup.clock.is_rehearsal,
+        )
+        self._notifier = Notifier()
+        self._health = Health(self._notifier)
+        self._snapshots = SnapshotFile(setup.directory, setup.files, 1)
+        self._service: Service | None = None
+        self._kept: Kept | None = None
+        self._memory: ControlState | None = None
+        self._stop_reason = ""
+        self._is_placed = True  # where it waits after a pass
+        self._move_until_tai_s = math.inf
+        self._log: Any = structlog.get_logger("station")
+
+    def stop(self, reason: str) -> None:
+        """End early and safely."""
+        self._stop_reason = self._stop_reason or reason
+        if self._service is not None:
+            self._service.stop(reason)
+
+    def answer(self, line: str) -> str:
+        """Answer a line of the control socket."""
+        if line == RELOAD:
+            return self.day.ask_reload()
+        return "error the station starts" if self._service is None else self._service.answer(line)
+
+    async def run(self) -> Outcome:
+        """Run until it is stopped.  Raises: NoAcuError: no good poll at the start."""
+        outcome = await self._pass() if self.day.look() else None
+        outcome = outcome or await self._rest()
+        while not self._stop_reason and outcome.reason != "duration over":
+            entry = self.day.coming()
+            if outcome.reason.endswith(" begins") and entry is not None:
+                outcome = await self._pass() or outcome
+            elif (place := self.day.place_after()) is not None and not self._is_placed:
+                self._is_placed = True
+                outcome = await self._move(*place)
+            if not self._stop_reason and outcome.reason != "duration over":
+                outcome = await self._rest()
+        return outcome
+
+    # The three kinds of runs
+
+    async def _rest(self) -> Outcome:
+        coming = self.day.coming()
+        target = self._first
+        job = self._job(target, _as_pass(coming), is_resting=True)
+        job = replace(job, satellite="" if coming is None else coming.satellite)
+
+        def why_anew(_is_waiting: bool, step_s: float) -> str:
+            if step_s and abs(self._setup.clock.follow()) > STEP_S:
+                self._setup.clock.obey()
+                self.day.reload_reason = f"the system clock was set by {step_s:+.1f} s"
+                return self.day.reload_reason
+            if why := self.day.look():
+                return why
+            if not self._is_placed and self.day.place_after() is not None:
+                return "the antenna is parked"
+            return "another pass is next" if self.day.coming() != coming else ""
+
+        return await self._serve(job, NoFits(), why_anew)
+
+    async def _pass(self) -> Outcome | None:
+        """Track the pass that is due; None: its files are refused."""
+        entry = self.day.coming()
+        if entry is None or entry.end_tai_s is None:
+            return None
+        try:
+            target, coming = self.day.begin(entry)
+            if self._kept is not None:
+                self._kept.flush()
+            self._kept = open_kept(
+                self._setup.directory, target, coming, self._setup.clock, self._setup.files, self._setup.older
+            )
+            job = self._job(target, coming)
+        except AcuDaemonError as error:
+            self.day.cannot_begin(entry, str(error))
+            return None
+        is_cut = entry.end_tai_s < coming.set_tai_s - 1.0
+        job = replace(job, end_tai_s=min(job.end_tai_s, entry.end_tai_s)) if is_cut else job
+        if self._memory is None:  # the first of this process: as one of a single pass is resumed
+            job = replace(job, state=self._kept.state, is_anew=False)
+        if self.day.station.hooks.before_move_s > 0.0:
+            self.day.hooks.call(Hook.BEFORE_MOVE, self.day.about(entry))
+        self.day.begun(entry)
+        self._is_placed = False
+        try:
+            outcome = await self._serve(job, self._setup.make_runner(job), None)
+        except AcuDaemonError as error:
+            self.day.ended(None, str(error))
+            raise
+        self.day.ended(outcome)
+        return replace(outcome, reason="cut as planned") if is_cut and outcome.reason == "duration over" else outcome
+
+    async def _move(self, az_deg: float, el_deg: float) -> Outcome:
+        now_tai_s = self._setup.clock.tai_s()
+        job = self._job(self._first, None)
+        azimuth, elevation = job.control.azimuth, job.control.elevation
+        way = Way(
+            way_s(azimuth.max_deg - azimuth.min_deg, azimuth), way_s(elevation.max_deg - elevation.min_deg, elevation)
+        )
+        self._move_until_tai_s = now_tai_s + way.both_s + MOVE_S
+        control = replace(job.control, preposition_s=math.inf)
+        job = replace(job, control=control, move=move_to(az_deg, el_deg, now_tai_s), satellite="")
+        self._log.info("station.moves", az_deg=az_deg, el_deg=el_deg)
+        if self.day.station.hooks.before_move_s > 0.0:
+            self.day.hooks.call(Hook.BEFORE_MOVE, {"az_deg": az_deg, "el_deg": el_deg})
+            await asyncio.sleep(self.day.station.hooks.before_move_s)
+        outcome = await self._serve(job, NoFits(), None)
+        self._move_until_tai_s = math.inf
+        return outcome
+
+    def _job(self, target: Target, coming: Pass | None, *, is_resting: bool = False) -> PassJob:
+        setup = self._setup
+        end_tai_s = setup.clock.tai_s() + setup.end_s - setup.clock.monotonic_s()
+        kept = self._kept if coming is not None and not is_resting else None
+        job = make_job(
+            target,
+            coming,
+            setup.link,
+            is_rehearsal=setup.clock.is_rehearsal,
+            end_tai_s=end_tai_s,
+            carried=kept.carried if kept else None,
+            memory=kept.memory if kept else None,
+        )
+        control = replace(job.control, is_shadow=setup.is_shadow, is_resting=is_resting)
+        state = job.state if self._memory is None else self._memory
+        return replace(job, control=control, state=state, is_anew=self._memory is not None)
+
+    async def _serve(self, job: PassJob, runner: FitRunner, why_anew: Callable[[bool, float], str] | None) -> Outcome:
+        if self._kept is None:  # what people and the antenna have told before this process
+            setup = self._setup
+            self._kept = open_kept(setup.directory, self._first, None, setup.clock, setup.files, setup.older)
+            job = replace(job, state=self._kept.state)
+        kept = self._kept
+        service = Service(
+            job,
+            self._setup.link,
+            self._setup.clock,
+            runner,
+            on_snapshot=self._show,
+            on_fit=kept.offer if job.coming is not None and not job.control.is_resting else None,
+            on_state=kept.see,
+            on_end=self._on_end,
+            files_alarm=self._files_alarm,
+            why_anew=why_anew,
+        )
+        self._service = service
+        if self._stop_reason:
+            service.stop(self._stop_reason)
+        outcome = await service.run()
+        self._memory = service.memory
+        return outcome
+
+    def _on_end(self) -> None:
+        """No tick feeds the supervisor's watchdog while the antenna is stopped."""
+        if self._stop_reason:
+            self._notifier("STOPPING=1")
+            return
+        loop = asyncio.get_running_loop()
+        for second in range(ceil(DEADLINE_S) + 1):
+            loop.call_later(second, self._notifier, "WATCHDOG=1")
+
+    def _files_alarm(self) -> str:
+        kept = self._kept.problem if self._kept else ""
+        return "; ".join(text for text in (self._setup.files.problem, self.day.problem, kept) if text)
+
+    def _show(self, seen: Snapshot) -> None:
+        self._health.see(seen)
+        self._snapshots.write(seen)
+        self.day.see(seen)
+        if self._live is not None:
+            self._live.show(seen)
+        if math.isfinite(self._move_until_tai_s) and self._service is not None:
+            if self._is_in_place(seen):
+                self._service.stop("in place")
+            elif seen.tai_s > self._move_until_tai_s:
+                self._log.warning("station.not_in_place", state=seen.state, arming=seen.arming)
+                self._service.stop("not in place")
+
+    def _is_in_place(self, seen: Snapshot) -> bool:
+        is_still = seen.speed_deg_s is not None and seen.speed_deg_s < STILL_DEG_S
+        return is_still and seen.off_path_deg is not None and seen.off_path_deg < IN_PLACE_DEG
+
+    async def close(self) -> None:
+        """End what runs beside the runs."""
+        await self.day.close()
+        if self._kept is not None:
+            self._kept.flush()
+        self._notifier.close()
+
+
+def _as_pass(entry: Entry | None) -> Pass | None:
+    if entry is None:
+        return None
+    return Pass(entry.rise_tai_s, entry.culmination_tai_s, entry.set_tai_s, 0.0, entry.culmination_el_deg, 0.0, 0.0)
+
+
+async def run_station(setup: StationSetup, clock: SystemClock, first: Target, live: LiveLine | None) -> Outcome:
+    """Run the station until SIGTERM or --duration.
+
+    SIGHUP reads the files again, where no terminal belongs to this process; with one it is a safe stop, as ever.
+    """
+    runs = StationRuns(setup, first, live)
+    loop = asyncio.get_running_loop()
+    loop.set_exception_handler(tell_loop_problem)
+    take_signals(loop, runs.stop, tell_signal)
+    if not _has_terminal():
+        loop.add_signal_handler(signal.SIGHUP, runs.day.ask_reload)
+    control = ControlSocket(setup.directory, runs.answer)
+    await control.open()
+    await runs.day.wind_reader.open()
+    sync = asyncio.create_task(clock.watch_synchronisation())
+    try:
+        await runs.day.first_plan()
+        gc.freeze()
+        outcome = await runs.run()
+        structlog.get_logger("station").info("station.done", **asdict(outcome))
+        return outcome
+    finally:
+        sync.cancel()
+        await control.close()
+        await runs.close()
+        if live is not None:
+            live.clear()
+        clock.close()
+
+
+def _has_terminal() -> bool:
+    try:
+        os.close(os.open("/dev/tty", os.O_RDWR | os.O_NOCTTY))
+    except OSError:
+        return False
+    return True

@@ -1,0 +1,150 @@
+"""The station of `acu-daemon run` in virtual time, on a SIMULATION: days in minutes, for tests and figures."""
+
+import asyncio
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from acu_daemon.cli.run_station import StationRuns, StationSetup, first_usable
+from acu_daemon.cli.virtual_pass import events_to
+from acu_daemon.daemon.service import Outcome, PassJob
+from acu_daemon.drivers.sa3842.codec import address_byte
+from acu_daemon.edge.clock import LoopClock
+from acu_daemon.edge.fit import InlineFitRunner
+from acu_daemon.edge.writer import Writer
+from acu_daemon.sim.acu import FakeAcu
+from acu_daemon.sim.build import make_sky
+from acu_daemon.sim.memory import MemoryLink
+from acu_daemon.sim.parts import AcuParts
+from acu_daemon.sim.scenario import AcuChoice, Scenario, SkyErrors
+from acu_daemon.sim.sky import Direction, SimulatedSky
+from acu_daemon.sim.trace import TraceRow
+from acu_daemon.sim.virtual import run_virtual
+
+ERRORS = SkyErrors(along_track_s=0.5)
+Action = Callable[["StationAccess"], None]
+
+
+@dataclass
+class Days:
+    """What a run of the station left."""
+
+    rows: list[TraceRow] = field(default_factory=list)
+    events: list[dict[str, Any]] = field(default_factory=list)
+    outcome: Outcome | None = None
+
+    def named(self, name: str) -> list[dict[str, Any]]:
+        """Log events of a name."""
+        return [one for one in self.events if one["event"] == name]
+
+
+@dataclass(frozen=True, slots=True)
+class StationAccess:
+    """What a script can reach."""
+
+    runs: StationRuns
+    acu: FakeAcu
+    link: MemoryLink
+    config: Path
+
+
+class OneAtATime:
+    """The sky of whichever satellite the station has turned to."""
+
+    def __init__(self, errors: SkyErrors) -> None:
+        self._errors = errors
+        self._sky: SimulatedSky | None = None
+
+    def turn_to(self, job: PassJob) -> None:
+        """The satellite of a run."""
+        self._sky = make_sky(job.refit.propagator, job.refit.site, Scenario(sky=self._errors))
+
+    def direction(self, tai_s: float) -> Direction | None:
+        return None if self._sky is None else self._sky.direction(tai_s)
+
+
+def run_days(
+    config: Path,
+    directory: Path,
+    begin_tai_s: float,
+    end_tai_s: float,
+    *,
+    script: Sequence[tuple[float, Action]] = (),
+    check: Callable[[str, float], list[str]] = lambda _name, _tai_s: [],
+    errors: SkyErrors = ERRORS,
+) -> Days:
+    """Run the station from one TAI to another; directory: its state.  script: what happens, each at its TAI.
+
+    A script that raises KilledError ends the run there.
+    """
+    days = Days()
+
+    async def beside(what: Callable[..., Any], *given: Any) -> Any:
+        return what(*given)
+
+    async def main() -> None:
+        clock = LoopClock(begin_tai_s)
+        first = first_usable(config, begin_tai_s)
+        acu_section = first.station.acu
+        sky = OneAtATime(errors)
+        parts = AcuParts(
+            acu_section.azimuth.limits(),
+            acu_section.elevation.limits(),
+            first.station.receiver.beamwidth_deg,
+            sky,
+            begin_tai_s,
+            Scenario(acu=AcuChoice()),
+            1,
+            address_byte(acu_section.address),
+            first.station.site.skyline,
+        )
+        acu = FakeAcu(parts)
+        acu.observer = days.rows.append
+        link = MemoryLink(acu, clock)
+
+        def runner(job: PassJob) -> InlineFitRunner:
+            sky.turn_to(job)
+            return InlineFitRunner(job.refit)
+
+        files = Writer("files")
+        setup = StationSetup(
+            config, clock, link, directory, files, math.inf, False, beside=beside, make_runner=runner, check=check
+        )
+        runs = StationRuns(setup, first, None)
+        loop, killed = asyncio.get_running_loop(), loop_future()
+        for tai_s, action in script:
+            loop.call_later(tai_s - begin_tai_s, _do, action, StationAccess(runs, acu, link, config), killed)
+        loop.call_later(end_tai_s - begin_tai_s, runs.stop, "the end of the days")
+        await runs.day.first_plan()
+        running: asyncio.Future[Any] = asyncio.ensure_future(runs.run())
+        try:
+            await asyncio.wait([running, killed], return_when=asyncio.FIRST_COMPLETED)
+            days.outcome = running.result() if running.done() else None
+        finally:
+            running.cancel()
+            await asyncio.gather(running, return_exceptions=True)
+            await runs.close()
+            files.close()
+
+    with events_to(days.events):
+        run_virtual(main())
+    return days
+
+
+def loop_future() -> "asyncio.Future[Any]":
+    """A future of the running loop."""
+    return asyncio.get_running_loop().create_future()
+
+
+def _do(action: Action, access: StationAccess, killed: "asyncio.Future[Any]") -> None:
+    try:
+        action(access)
+    except KilledError:
+        if not killed.done():
+            killed.set_result(None)
+
+
+class KilledError(Exception):
+    """What a script raises for a SIGKILL."""
