@@ -11,6 +11,7 @@ import typer
 from acu_daemon.cli.check_acu import acu_findings
 from acu_daemon.cli.check_finding import GO, NO_GO, WARN, Finding
 from acu_daemon.cli.check_running import held_finding, left_behind, running_finding
+from acu_daemon.cli.check_satellite import satellite_findings
 from acu_daemon.cli.options import (
     Config,
     antenna_of,
