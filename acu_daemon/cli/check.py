@@ -93,7 +93,7 @@ def findings(config: Path, satellite: str | None, now_tai_s: float, state: Path 
         said = "; ".join(text for text in (earth.about, earth.warning) if text)
         yield Finding(WARN if earth.warning else GO, "Earth orientation", said)
     yield from _air(config, station, now_tai_s)
-    yield from sourcesfindings(config, station.elements, now_tai_s)
+    yield from sources_findings(config, station.elements, now_tai_s)
     directory, antenna = state_path(state, is_rehearsal=False), antenna_of(station)
     folders = (antenna.folder(directory), *older_folders(directory, antenna))
     names = [satellite] if satellite else satellite_names(config)
@@ -127,7 +127,7 @@ def _air(config: Path, station: StationFile, now_tai_s: float) -> Iterator[Findi
         yield Finding(WARN if reader.problem else GO, "air", "; ".join(one for one in (air, reader.problem) if one))
 
 
-def sourcesfindings(config: Path, section: ElementsSourcesSection, now_tai_s: float) -> Iterator[Finding]:
+def sources_findings(config: Path, section: ElementsSourcesSection, now_tai_s: float) -> Iterator[Finding]:
     """How the station's sources of elements stand: never a reason not to track, the elements' own age is."""
     for one in standings(config, section, now_tai_s):
         yield Finding(WARN if one.is_problem else GO, "elements source", f"{one.source}: {one.text}")
