@@ -18,13 +18,15 @@ from acu_daemon.orbit.element_set import ElementSet
 from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator
 from acu_daemon.orbit.tle import parse_tle
+from acu_daemon.pointing.envelope import Envelope
 from acu_daemon.schedule.exact_plan import Slot, best_slots, slots_of
 from acu_daemon.schedule.pass_track import PassTrack, track_of
 from acu_daemon.schedule.rules import SatelliteRules, StationRules
 from acu_daemon.units import DAY_S
 
 LOWEST_DEG, LOW_ORBIT_REV_DAY = 5.0, 11.0
-RULES = StationRules(AxisLimits(-270.0, 270.0, 6.0, 3.0), AxisLimits(0.0, 90.0, 3.0, 2.0))
+BOUNDS = Envelope(AxisLimits(-270.0, 270.0, 6.0, 3.0), AxisLimits(0.0, 90.0, 3.0, 2.0))
+RULES = StationRules(BOUNDS.azimuth, BOUNDS.elevation)
 
 
 def main() -> None:
@@ -84,10 +86,7 @@ def _random_day(sets: list[ElementSet], random: np.random.Generator, arguments: 
             SatelliteRules(int(random.integers(1, 10)), may_be_cut=bool(random.integers(2))),
         )
         passes = find_passes(propagator, site, start_tai_s, start_tai_s + 3600.0 * arguments.hours, LOWEST_DEG)
-        tracks += [
-            track_of(str(sets[at].norad_id), propagator, site, one, rules, RULES.azimuth, RULES.elevation)
-            for one in passes
-        ]
+        tracks += [track_of(str(sets[at].norad_id), propagator, site, one, rules, BOUNDS) for one in passes]
     return tracks
 
 

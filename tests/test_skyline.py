@@ -12,7 +12,11 @@ from acu_daemon.orbit.look import apparent_at
 from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.orbit.visibility import why_none
+from acu_daemon.pointing.keep_out import KeepOut
+from acu_daemon.pointing.outage import kept_out
 from acu_daemon.pointing.skyline import skyline_of
+from acu_daemon.schedule.pass_track import track_of
+from acu_daemon.schedule.rules import SatelliteRules
 from acu_daemon.sim.scenario import AcuChoice
 
 LOW_TAI_S = tai_from_utc("2026-08-19T01:09:00Z")  # before a pass from azimuth 338 over 279, 22 deg high, to 220
@@ -88,3 +92,19 @@ def test_behind_the_hill_the_prediction_is_followed_and_it_is_told(flight: Fligh
 
 def test_the_signal_is_back_at_the_end_of_the_hill(flight: Flight) -> None:
     assert seconds_to_state(flight, "AUTOTRACK/FITTED", hill()[1] - 2.0) < 4.0
+
+
+def test_the_schedule_counts_no_second_behind_a_hill_nor_in_a_keep_out_as_useful() -> None:
+    coming, bounds = coming_pass(TARGET, LOW_TAI_S), TARGET.station.bounds
+    whole = replace(bounds, skyline=None)
+    [(hides, shows)] = coming.hidden_tai_s
+    first, last = coming.rise_tai_s, coming.set_tai_s
+    track = track_of("demo", PROPAGATOR, SITE, coming, SatelliteRules(), bounds)
+    turn_deg = track.turns_deg(first, last, bounds.azimuth)[0]
+    useful_s = track.useful_s(first, last, turn_deg, bounds.azimuth)
+    assert useful_s == pytest.approx(last - first - (shows - hides), abs=8.0)
+    mast = KeepOut("the mast", 270.0, 290.0)
+    kept = sum(one.duration_s for one in kept_out(PROPAGATOR, SITE, (mast,), coming))
+    track = track_of("demo", PROPAGATOR, SITE, coming, SatelliteRules(), replace(whole, keep_outs=(mast,)))
+    assert kept > 20.0
+    assert track.useful_s(first, last, turn_deg, bounds.azimuth) == pytest.approx(last - first - kept, abs=8.0)

@@ -55,11 +55,9 @@ def _tracks(config: Path, name: str, now_tai_s: float, until_tai_s: float) -> li
     target = load_target(config, name, now_tai_s, is_strict=False)
     if target.elements.errors:
         raise ElementsError("; ".join(target.elements.errors))
-    acu, rules = target.station.acu, target.satellite.schedule.rules()
+    bounds, rules = target.station.bounds, target.satellite.schedule.rules()
     return [
-        track_of(
-            name, one.elements.propagator, one.station.site, coming, rules, acu.azimuth.limits(), acu.elevation.limits()
-        )
+        track_of(name, one.elements.propagator, one.station.site, coming, rules, bounds)
         for one, passes in passes_by_epoch(config, name, target, now_tai_s, until_tai_s)
         for coming in passes
     ]

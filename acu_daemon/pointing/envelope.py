@@ -77,6 +77,13 @@ class Envelope:
         rooms: Array = np.vectorize(self.room_deg, otypes=[np.float64])(az_deg, el_deg, tai_s)
         return rooms
 
+    def is_clear(self, az_deg: npt.ArrayLike, el_deg: npt.ArrayLike, tai_s: npt.ArrayLike) -> Truth:
+        """Whether the beam is outside all zones there, on whatever turn; () or (N,)."""
+        if not self.has_zones:
+            return np.ones(np.broadcast(az_deg, el_deg, tai_s).shape, dtype=np.bool_)
+        clear: Truth = np.vectorize(self.clearance_deg, otypes=[np.float64])(az_deg, el_deg, tai_s) >= 0.0
+        return clear
+
     def sees(self, az_deg: npt.ArrayLike, el_deg: npt.ArrayLike) -> Truth:
         """Whether the sky is free there, above the skyline; () or (N,)."""
         if self.skyline is None:

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from acu_daemon.assist.mount_model import encoder_look
 from acu_daemon.model import AxisLimits, Pass, Site
 from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.pointing.envelope import Envelope
 from acu_daemon.pointing.wrap import equal_turns
 from acu_daemon.schedule.rules import SatelliteRules
 from acu_daemon.units import Array
@@ -19,7 +20,9 @@ KEYHOLE_MARGIN = 0.95  # of the drive's rate: a path that is faster leaves the b
 
 @dataclass(frozen=True)
 class PassTrack:
-    """Times (N,) TAI s, encoder angles (N,) deg, azimuth continuous; is_useful (N,): above the mask and slow enough."""
+    """Times (N,) TAI s, encoder angles (N,) deg, azimuth continuous; is_useful (N,): over the mask,
+    outside keep-out zones, and slow enough.
+    """
 
     satellite: str
     coming: Pass
@@ -63,8 +66,7 @@ def track_of(
     site: Site,
     coming: Pass,
     rules: SatelliteRules,
-    azimuth: AxisLimits,
-    elevation: AxisLimits,
+    envelope: Envelope,
 ) -> PassTrack:
     """Sample a pass.  OrbitError: the propagator has no answer for a time of it."""
     set_tai_s = min(coming.set_tai_s, coming.rise_tai_s + LONGEST_S)
@@ -72,6 +74,8 @@ def track_of(
     tai_s = np.linspace(coming.rise_tai_s, set_tai_s, count)
     look = encoder_look(propagator, tai_s, site, None)
     az_deg = np.degrees(np.unwrap(np.radians(look.az_deg)))
-    is_slow = np.abs(np.gradient(az_deg, tai_s)) <= KEYHOLE_MARGIN * azimuth.max_rate_deg_s
+    elevation = envelope.elevation
+    is_slow = np.abs(np.gradient(az_deg, tai_s)) <= KEYHOLE_MARGIN * envelope.azimuth.max_rate_deg_s
     is_inside = (look.el_deg >= elevation.min_deg) & (look.el_deg <= elevation.max_deg)
-    return PassTrack(satellite, coming, rules, tai_s, az_deg, look.el_deg, is_slow & is_inside)
+    is_free = envelope.sees(az_deg, look.el_deg) & envelope.is_clear(az_deg, look.el_deg, tai_s)
+    return PassTrack(satellite, coming, rules, tai_s, az_deg, look.el_deg, is_slow & is_inside & is_free)

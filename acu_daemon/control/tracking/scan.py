@@ -91,13 +91,15 @@ def pointing(scan: Scan, prediction: Prediction, tai_s: float, config: ControlCo
     return replace(point, el_deg=el_deg, el_rate_deg_s=point.el_rate_deg_s if el_deg == point.el_deg else 0.0)
 
 
-def may_look(point: Pointing | None, config: ControlConfig) -> bool:
-    """Whether the antenna may point there: above the mask, within the limits."""
+def may_look(point: Pointing | None, tai_s: float, config: ControlConfig) -> bool:
+    """Whether the antenna may point there, and sees anything: above the mask, within the limits, outside keep-outs."""
     if point is None or not point.is_finite:
         return False
     lowest_deg = max(config.elevation.min_deg, config.min_elevation_deg)
     is_high_enough = lowest_deg <= point.el_deg <= config.elevation.max_deg
-    is_seen = config.envelope.over_skyline_deg(point.az_deg, point.el_deg) >= 0.0
+    envelope = config.envelope
+    is_seen = envelope.over_skyline_deg(point.az_deg, point.el_deg) >= 0.0
+    is_seen = is_seen and envelope.clearance_deg(point.az_deg, point.el_deg, tai_s) >= 0.0
     return is_high_enough and is_seen and nearest_turn(point.az_deg, 0.0, config.azimuth) is not None
 
 
@@ -129,7 +131,7 @@ def _grown(
     covered = (min(early_s, seen[0]), max(late_s, seen[0]))
     scan = replace(scan, rows=tuple(sorted((scan.covered | {scan.row: covered}).items())))
     moved = replace(scan, along_s=scan.along_s + scan.side * dt_s * pace, is_moving=True)
-    return moved if may_look(look(moved, prediction, tai_s, config), config) else replace(scan, is_aimed=False)
+    return moved if may_look(look(moved, prediction, tai_s, config), tai_s, config) else replace(scan, is_aimed=False)
 
 
 def pace_s_s(scan: Scan, prediction: Prediction, tai_s: float, config: ControlConfig) -> float:
@@ -162,7 +164,9 @@ def _aimed(scan: Scan, prediction: Prediction, tai_s: float, config: ControlConf
         if scan.is_aimed and (row, side) == (scan.row, scan.side):
             return scan
         aimed = replace(scan, row=row, side=side, along_s=edge_s, is_aimed=True, waited_s=0.0)
-        if may_look(look(aimed, prediction, tai_s, config), config) and _may_grow(aimed, prediction, tai_s, config):
+        if may_look(look(aimed, prediction, tai_s, config), tai_s, config) and _may_grow(
+            aimed, prediction, tai_s, config
+        ):
             return aimed
     if is_done(scan, asked):
         return Scan(model=scan.model, round_count=scan.round_count + 1)
@@ -180,7 +184,7 @@ def _open(scan: Scan, asked: tuple[Box, ...]) -> Iterator[tuple[int, int, float]
 def _may_grow(scan: Scan, prediction: Prediction, tai_s: float, config: ControlConfig) -> bool:
     """Whether there is anything to see beyond the place, on its side."""
     beyond = replace(scan, along_s=scan.along_s + scan.side * ENDS_S)
-    return may_look(look(beyond, prediction, tai_s, config), config)
+    return may_look(look(beyond, prediction, tai_s, config), tai_s, config)
 
 
 def _sides(scan: Scan, row: int, box: Box) -> Iterator[tuple[int, float]]:
