@@ -3,9 +3,10 @@
 import asyncio
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
+from acu_daemon.acu.driver import AcuDriver
 from acu_daemon.cli.options import Target, coming_pass
 from acu_daemon.cli.run_setup import make_job
 from acu_daemon.cli.virtual_pass import events_to
@@ -180,14 +181,24 @@ def fly_rotator(
     habits: Habits | None = None,
     script: Sequence[tuple[float, Action]] = (),
     is_rehearsal: bool = True,
+    driver: AcuDriver | None = None,
 ) -> RotatorFlight:
-    """Run the daemon on a pass in virtual time.  script: what happens, in seconds from the beginning."""
+    """Run the daemon on a pass in virtual time.  script: what happens, in seconds from the beginning.
+
+    driver: of another ACU that speaks in lines, as `rotator` does then; by default that of rotctld.
+    """
     flight, habits = RotatorFlight(rotator), habits or Habits()
 
     async def main() -> None:
         clock = LoopClock(begin_tai_s)
         flight.link = link = RotctldLink(rotator, clock, habits)
         job = make_job(target, coming_pass(target, begin_tai_s), link, is_rehearsal=is_rehearsal, end_tai_s=end_tai_s)
+
+        if driver is not None:
+            can = driver.capabilities
+            watchdog_s = job.control.register_watchdog_s if can.has_register_watchdog else 0.0
+            control = replace(job.control, acu=can, has_signal=can.has_autotrack, register_watchdog_s=watchdog_s)
+            job = replace(job, driver=driver, control=control)
 
         def look(seen: Snapshot) -> None:
             rotator.advance(clock.monotonic_s())

@@ -198,6 +198,34 @@ def test_after_a_stop_it_stands_until_remote_is_selected_whatever_is_commanded(b
 
 
 @benches
+def test_with_autotrack_it_takes_the_signal_and_goes_by_command_when_it_is_lost(bench: Bench) -> None:
+    table = Table(bench)
+    if not table.driver.capabilities.has_autotrack:
+        refused = table.ask(SelectMode(AcuMode.AUTOTRACK))
+        assert isinstance(refused, Refused)
+        assert table.status().mode is not AcuMode.AUTOTRACK
+        return
+    table.ask(PointAt(30.0, 40.0))
+    table.ask(SelectBackup(Backup.REMOTE))
+    table.ask(SelectMode(AcuMode.AUTOTRACK))
+    status = table.status()
+    assert (status.mode, status.is_autotrack_selected, status.is_acquired) == (AcuMode.ACQUIRE, True, False)
+    assert status.follows_registers
+    for _ in range(2):
+        table.acu.hears(True)
+        table.lead(PointAt(30.0, 40.0), 3.0)
+        status = table.status()
+        assert (status.mode, status.is_acquired, status.follows_registers) == (AcuMode.AUTOTRACK, True, False)
+        table.acu.hears(False)
+        table.lead(THERE)
+        status = table.status()
+        assert (status.mode, status.is_acquired, status.is_autotrack_selected) == (AcuMode.REMOTE_BACKUP, False, True)
+        assert table.off_deg(THERE) < 0.2
+        table.lead(PointAt(30.0, 40.0))
+    assert status.contradictions == ()
+
+
+@benches
 def test_a_reply_that_comes_too_late_is_not_the_next_commands(bench: Bench) -> None:
     table = Table(bench)
     table.ask(SelectMode(AcuMode.REMOTE))

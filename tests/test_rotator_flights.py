@@ -1,19 +1,26 @@
 """Passes by program track on a simulated rotator behind rotctld: followed; troubles are told, and it goes on."""
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 import config_files
 import numpy as np
 import pytest
 from conftest import DATA
+from driver_benches import TaggedOnBench
 from rotators import Habits, Rotator, RotatorFlight, fly_rotator
+from tagged_driver import TaggedDriver
 
 from acu_daemon.assist.mount_model import encoder_look
 from acu_daemon.cli.options import Target, coming_pass, load_target
 from acu_daemon.errors import UsageError
 from acu_daemon.model import sky_angle_deg
 from acu_daemon.orbit.timescales import tai_from_utc
+from acu_daemon.sim.build import make_sky
+from acu_daemon.sim.scenario import Scenario, SkyErrors
+from acu_daemon.sim.sky import SimulatedSky
+from acu_daemon.units import wrap_180
 
 NOAA_20 = """
 [satellite]
@@ -162,6 +169,56 @@ def test_p5_an_axis_that_stands_still_is_stopped_and_latched(tmp_path: Path) -> 
     ]
     latched = next(i for i, order in enumerate(rotator.orders) if order[1] == "S")
     assert all(order[1] == "S" for order in rotator.orders[latched:])
+
+
+@dataclass
+class TaggedUnderTheSky(Rotator):
+    """The imaginary ACU of tagged_driver, which hears a satellite within 2 deg of where it points, but in a loss."""
+
+    sky: SimulatedSky | None = None
+    begin_tai_s: float = 0.0
+    lost_s: tuple[float, float] = (60.0, 90.0)
+
+    def __post_init__(self) -> None:
+        axes = Rotator((20.0, 5.0), 0.001, 0.0, place=self.place)
+        self.acu = TaggedOnBench(axes)
+
+    def advance(self, now_s: float) -> None:
+        assert self.sky is not None
+        at = self.sky.direction(self.begin_tai_s + now_s)
+        az_deg, el_deg = self.acu.place(now_s)
+        self.place[:] = az_deg, el_deg
+        is_lost = self.lost_s[0] <= now_s < self.lost_s[1]
+        is_near = at is not None and sky_angle_deg(az_deg, el_deg, at[0], at[1]) < 2.0
+        self.acu.hears(is_near and not is_lost)
+        if at is not None:
+            self.acu.source_deg = az_deg + wrap_180(at[0] - az_deg), at[1]
+
+    def answer(self, line: str, now_s: float) -> str:
+        self.advance(now_s)
+        return self.acu.said(line, now_s) + "\n"
+
+
+def test_p2_another_acu_with_autotrack_is_tracked_fitted_and_led_through_a_loss(tmp_path: Path) -> None:
+    """One that was written from docs/adding-an-acu.md alone: no watchdog, no read-back, bearings, tagged lines."""
+    target = brouwer(tmp_path, config_files.STATION.replace("-270.0", "-180.0").replace("270.0", "180.0"))
+    begin = mid_pass(target)
+    path = encoder_look(target.elements.propagator, np.array([begin]), target.station.site, None)
+    sky = make_sky(target.elements.propagator, target.station.site, Scenario(sky=SkyErrors(along_track_s=1.0)))
+    place = [wrap_180(float(path.az_deg[0])), float(path.el_deg[0])]
+    acu = TaggedUnderTheSky(place=place, sky=sky, begin_tai_s=begin)
+    flight = fly_rotator(target, acu, begin, begin + 110.0, driver=TaggedDriver())
+    assert flight.states()[-3:] == ["AUTOTRACK/FITTED", "HOLD/FITTED", "AUTOTRACK/FITTED"]
+    assert flight.outcome is not None
+    assert flight.outcome.has_acquired
+    assert flight.outcome.is_stopped
+    assert flight.outcome.refit_count > 10
+    assert flight.outcome.refusal_count == 0
+    lost = [seen for seen in flight.snapshots if seen.state == "HOLD/FITTED"]
+    assert len(lost) > 250
+    assert {seen.acu_mode for seen in lost[5:]} == {"REMOTE_BACKUP"}
+    assert max(seen.off_path_deg or 0.0 for seen in lost[20:]) < 0.2
+    assert flight.named("acu.watchdog_refused") == []
 
 
 def test_limits_that_the_rotator_does_not_reach_end_the_run_and_say_what_to_do(tmp_path: Path) -> None:
