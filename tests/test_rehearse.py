@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from command_line import acu_daemon
-from config_files import BROUWER, replaced, write
+from config_files import BROUWER, STATION, replaced, write
 
 from acu_daemon.cli import rehearse
 from acu_daemon.cli.options import Target, coming_pass, load_target
@@ -69,6 +69,15 @@ def test_another_acu_is_for_a_rehearsal_or_is_said_to_move_the_same_antenna(tmp_
     assert refused.code == 2
     assert "--same-antenna" in refused.err
     assert "--at" in refused.err
+
+
+def test_an_acu_that_is_not_simulated_here_is_said(tmp_path: Path) -> None:
+    epoch = utc_text(rehearse.SystemClock().tai_s(), 0)
+    station = replaced(STATION, "[acu]\n", '[acu]\ndialect = "rotctl"\n') + '[receiver]\nsignal = "none"\n'
+    config = write(tmp_path, station, scd=replaced(BROUWER, "1989-01-31T09:58:00Z", epoch))
+    done = acu_daemon("rehearse", "--config", config, "--satellite", "scd")
+    assert done.code == 2
+    assert 'dialect = "rotctl"' in done.err
 
 
 @pytest.mark.realtime

@@ -36,3 +36,8 @@ def test_every_state_has_a_place_of_its_own() -> None:
 def test_sets_of_states_are_named_in_the_order_of_the_states() -> None:
     assert states.named(frozenset(TrackState) - {TrackState.LINK_LOST}) == "all but LINK-LOST"
     assert states.named(frozenset({TrackState.HOLD_TLE, TrackState.ACQUIRE_TLE})) == "ACQUIRE/TLE, HOLD/TLE"
+
+
+def test_the_glossary_has_every_state() -> None:
+    text = (states.PICTURE.parents[1] / "glossary.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"^\| `([A-Z/-]+)` \|.*\|.*\|$", text, re.MULTILINE)) == set(TrackState)

@@ -37,6 +37,7 @@ from acu_daemon.units import DAY_S
 
 LEAD_S = 4.0  # until both processes have loaded; the rehearsed time begins after it
 BEFORE_S = 30.0
+SIMULATED_DIALECT = "sa3842"
 MOST_BEFORE_S = 3600.0
 LEAST_FLOWN_S = 5.0
 ALONG_TRACK_S, ENCODER_NOISE_DEG = 0.5, 0.02  # what the elements and the encoders are wrong by
@@ -115,6 +116,8 @@ def command(
     check_duration(duration)
     now_tai_s = SystemClock().tai_s()
     target = nearest_to_pass(config, satellite, load_target(config, satellite, now_tai_s), now_tai_s)
+    if (dialect := target.station.acu.dialect) != SIMULATED_DIALECT:
+        raise UsageError(f'[acu] dialect = "{dialect}": only an ACU with "{SIMULATED_DIALECT}" is simulated here')
     flown = _planned(target, now_tai_s, before, duration, skip, out / satellite)
     chosen = _scenario(flown, scenario, has_losses=losses)
     _tell(flown, chosen, now_tai_s, config)

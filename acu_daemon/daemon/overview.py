@@ -57,6 +57,7 @@ _STEERS = {
     S.HOLD_TLE: "the daemon, by the elements; autotrack takes over with the signal",
     S.SEARCH: "the daemon, around the path; autotrack takes over with the signal",
     S.ZENITH: "the daemon, past the zenith; then autotrack",
+    S.FALSE_LOCK: "the daemon, back from a false lock onto the path; then autotrack",
     S.AVOID: "the daemon, clear of a keep-out; then autotrack",
     S.MANUAL: "the local panel",
     S.STOW: "the ACU, to or in the stow position",
