@@ -68,3 +68,11 @@ def test_the_picture_has_them_all(config: Path, tmp_path: Path) -> None:
         assert f"<!-- {what} -->" in text
     refused = passes(config, "--plot", tmp_path / "sky.txt")
     assert (refused.code, ".png" in refused.err) == (2, True)
+
+
+def test_check_says_what_bounds_the_beam_and_what_the_next_pass_meets(config: Path) -> None:
+    said = acu_daemon("check", "--config", config, "--at", "2026-08-24T11:00:00Z").out
+    [bounds] = [line for line in said.splitlines() if "envelope" in line]
+    assert bounds.endswith("a mask of 3 to 24 deg; kept out of the mast; kept 4 deg from the sun")
+    [sun] = [line for line in said.splitlines() if "demo-1: sun" in line]
+    assert sun.startswith("WARN") and sun.endswith("; it is led around")

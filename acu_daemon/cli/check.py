@@ -93,6 +93,8 @@ def findings(config: Path, satellite: str | None, now_tai_s: float, state: Path 
         said = "; ".join(text for text in (earth.about, earth.warning) if text)
         yield Finding(WARN if earth.warning else GO, "Earth orientation", said)
     yield from _air(config, station, now_tai_s)
+    if bounds := station.envelope.told():
+        yield Finding(GO, "envelope", bounds)
     yield from sources_findings(config, station.elements, now_tai_s)
     directory, antenna = state_path(state, is_rehearsal=False), antenna_of(station)
     folders = (antenna.folder(directory), *older_folders(directory, antenna))

@@ -1,6 +1,7 @@
 """New elements moved into place while the daemon waits for a pass: read, judged, and taken unless they are worse."""
 
 import asyncio
+import contextlib
 from dataclasses import replace
 from functools import partial
 from math import isfinite
@@ -14,6 +15,7 @@ from acu_daemon.config.load import load_satellite, load_station
 from acu_daemon.config.satellite_tables import ElementsFileSection, SatelliteFile
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.elements_choice import ElementsSources, choose_elements
+from acu_daemon.edge.elements_store import confirm_doubtful
 from acu_daemon.errors import AcuDaemonError, ElementsError
 from acu_daemon.model import Pass
 from acu_daemon.orbit.propagator import is_ephemeris, spans_tai_s
@@ -111,6 +113,17 @@ class ElementsWatch:
             except OSError as error:
                 contents += str(error).encode() + b"\0"
         return contents + repr(self._sources_stamp).encode()
+
+
+def keep_confirmed(config: Path, target: Target) -> None:
+    """Believe a set that the fetcher had kept beside the others, where the last pass has shown that it is right."""
+    epoch_tai_s, norad_id = target.elements.confirmed_tai_s, target.satellite.satellite.norad_id
+    if epoch_tai_s is None or norad_id is None:
+        return
+    log: Any = structlog.get_logger("elements")
+    log.info("elements.confirmed", satellite=target.elements.label, epoch=utc_text(epoch_tai_s, 0))
+    with contextlib.suppress(OSError):  # a store of somebody else's: it is chosen all the same
+        confirm_doubtful(config / target.station.elements.store, norad_id, epoch_tai_s)
 
 
 def _stamps(paths: list[Path]) -> Stamp:

@@ -18,7 +18,7 @@ import typer
 
 from acu_daemon import PROCESS_START_S
 from acu_daemon.cli.clock_wait import wait_for_clock
-from acu_daemon.cli.elements_watch import ElementsWatch
+from acu_daemon.cli.elements_watch import ElementsWatch, keep_confirmed
 from acu_daemon.cli.options import (
     At,
     AtMonotonic,
@@ -49,7 +49,6 @@ from acu_daemon.edge.clock import STEP_S, SystemClock
 from acu_daemon.edge.control_socket import ControlSocket
 from acu_daemon.edge.denied import denied
 from acu_daemon.edge.elements_fetching import ElementsFetching
-from acu_daemon.edge.elements_store import confirm_doubtful
 from acu_daemon.edge.event_loop import loop_runner
 from acu_daemon.edge.fit import ProcessFitRunner
 from acu_daemon.edge.link import check_rate, make_link
@@ -62,7 +61,6 @@ from acu_daemon.edge.state_directory import SnapshotFile, antenna_directory, cho
 from acu_daemon.edge.systemd import Notifier
 from acu_daemon.edge.writer import QueuedStream, Writer
 from acu_daemon.errors import AcuDaemonError, UsageError
-from acu_daemon.orbit.timescales import utc_text
 
 STDERR = 2
 SNAPSHOT_TICKS = 5  # where no live line is drawn: a snapshot costs a tenth of a tick
@@ -213,19 +211,8 @@ def _load(config: Path, name: str, clock: SystemClock, folders: tuple[Path, ...]
     """The elements for the coming pass.  folders: of the antenna's state, in which the last pass's fit is."""
     target = load_target(config, name, clock.tai_s(), folders=folders)
     target = nearest_to_pass(config, name, target, clock.tai_s(), folders=folders)
-    if target.elements.confirmed_tai_s is not None:
-        _confirm(config, target, target.elements.confirmed_tai_s)
+    keep_confirmed(config, target)
     return target
-
-
-def _confirm(config: Path, target: Target, epoch_tai_s: float) -> None:
-    """The last pass has shown that a set is right which the fetcher had kept beside the others."""
-    log: Any = structlog.get_logger("elements")
-    log.info("elements.confirmed", satellite=target.elements.label, epoch=utc_text(epoch_tai_s, 0))
-    norad_id, section = target.satellite.satellite.norad_id, target.station.elements
-    if norad_id is not None:
-        with contextlib.suppress(OSError):  # a store of somebody else's: it is chosen all the same
-            confirm_doubtful(config / section.store, norad_id, epoch_tai_s)
 
 
 def _watched(runner: asyncio.Runner, run: Coroutine[Any, Any, Outcome]) -> Outcome:

@@ -246,6 +246,7 @@ class StationRuns:
             on_state=kept.see,
             on_end=self._on_end,
             files_alarm=self._files_alarm,
+            elements_problem=lambda: self.day.fetching.problem,
             why_anew=why_anew,
         )
         self._service = service

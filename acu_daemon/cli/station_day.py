@@ -9,7 +9,7 @@
 import asyncio
 import contextlib
 import math
-from collections.abc import Callable, Coroutine, Iterable
+from collections.abc import Callable, Collection, Coroutine
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ import structlog
 
 from acu_daemon.cli.check import findings
 from acu_daemon.cli.check_finding import NO_GO
+from acu_daemon.cli.elements_watch import keep_confirmed
 from acu_daemon.cli.options import Target, coming_pass, load_target, longest_lead
 from acu_daemon.cli.schedule_plan import StationPlan, station_plan
 from acu_daemon.config.load import load_station
@@ -27,6 +28,8 @@ from acu_daemon.daemon.service import Outcome
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.daemon.verdict import alarms
 from acu_daemon.edge.clock import Clock
+from acu_daemon.edge.elements_choice import ElementsSources
+from acu_daemon.edge.elements_fetching import ElementsFetching
 from acu_daemon.edge.hooks import Hook, Hooks
 from acu_daemon.edge.schedule_file import ScheduleFile, Words
 from acu_daemon.edge.wind_reader import WindReader
@@ -103,6 +106,7 @@ class StationDay:
             station.wind.udp, None if station.wind.file is None else config / station.wind.file
         )
         self.wind = WindWatch()
+        self.fetching = ElementsFetching(config, station.elements, clock, is_rehearsal=is_rehearsal)
         self.entry: Entry | None = None  # the pass that is on
         self.reload_reason = "the start"
 
@@ -162,6 +166,7 @@ class StationDay:
     def look(self) -> str:
         """Look, once a second between passes, at all that may change; why the rest ends, empty: it does not."""
         now_tai_s = self._clock.tai_s()
+        self.fetching.look()
         self._look_at_wind(now_tai_s)
         self._look_at_words()
         self._look_at_files(now_tai_s)
@@ -290,6 +295,7 @@ class StationDay:
                 self._config, entry.satellite, now_tai_s, at_tai_s=at_tai_s, folders=(self._file.path.parent,)
             )
             self._good[entry.satellite] = target
+            keep_confirmed(self._config, target)
         except AcuDaemonError as error:
             if entry.satellite not in self._good:
                 raise
@@ -394,6 +400,7 @@ class StationDay:
         """End what runs beside the loop."""
         self.hooks.end_during()
         await self.hooks.close()
+        await self.fetching.close()
         self.wind_reader.close()
         for task in (self._planning, self._checking):
             if task is not None:
@@ -412,11 +419,15 @@ def _resumed(entry: Entry, now_tai_s: float) -> Entry:
     return replace(entry, state=PassState.PLANNED, reason=RESUMED) if is_on else entry
 
 
-def _stamp(config: Path, targets: Iterable[Target]) -> dict[str, tuple[int, ...]]:
+def _stamp(config: Path, targets: Collection[Target]) -> dict[str, tuple[int, ...]]:
     """What changes when a file of the configuration does, by file."""
     paths = [config / "station.toml", *sorted((config / "satellites").glob("*.toml"))]
     names = (getattr(target.satellite.elements, "file", "") for target in targets)
     paths += [config / "satellites" / name for name in names if name]
+    for target in targets:
+        sources, norad_id = ElementsSources.of(config, target.station.elements), target.satellite.satellite.norad_id
+        if sources is not None and norad_id is not None:
+            paths += sources.files(norad_id)
     found: dict[str, tuple[int, ...]] = {}
     for path in paths:
         with contextlib.suppress(OSError):

@@ -131,5 +131,17 @@ class EnvelopeSection(Section):
             raise ValueError(f"{self.mask} is not read")
         return None if self.mask is None else skyline_of(self.mask)
 
+    def told(self) -> str:
+        """Say what bounds the beam beside the limits; empty: nothing that the file has asked for."""
+        skyline, zones = self.skyline, [one.name for one in self.keep_out]
+        parts = []
+        if skyline is not None:
+            parts.append(f"a mask of {min(skyline.el_deg):g} to {max(skyline.el_deg):g} deg")
+        if zones:
+            parts.append(f"kept out of {', '.join(zones)}")
+        if self.sun_policy == "avoid":
+            parts.append(f"kept {self.sun_keep_out_deg:g} deg from the sun")
+        return "; ".join(parts)
+
     def sun(self, site: Site) -> Sun | None:
         return None if self.sun_policy == "off" else Sun(site, self.sun_keep_out_deg, self.sun_policy)
