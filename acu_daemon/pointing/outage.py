@@ -13,7 +13,7 @@ from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.pointing.keep_out import KeepOut, Sun
 from acu_daemon.units import DEG, Array
 
-STEP_S, MOST_STEPS = 0.5, 20000  # a low orbit moves by half a degree in one at most
+STEP_S, MOST_STEPS = 0.5, 5000  # a low orbit moves by half a degree in one; some ms of work, in the loop
 LOWEST_SUN_EL_DEG = -1.0  # one that has set disturbs no pass
 
 
