@@ -327,3 +327,17 @@ def test_it_is_drawn_in_place_at_every_second_tick_and_cleared_before_a_log_line
     live.clear()
     assert stream.getvalue().count("\r\033[K") == 4
     assert stream.getvalue().endswith("\r\033[K")
+
+
+def test_status_has_a_row_for_a_sun_that_is_near_or_comes() -> None:
+    assert not [row for row in status_lines(replace(SEEN, sun_deg=80.0)) if row.startswith("sun")]
+    for changes, text in (
+        ({}, "12.3 deg from the beam"),
+        ({"sun_reach_s": 512.0}, "12.3 deg from the beam, its keep-out is here in 8:32"),
+        (
+            {"sun_reach_s": 0.0, "way_out_az_deg": 61.52, "way_out_el_deg": 30.0},
+            "12.3 deg from the beam, within its keep-out, clear of it is az 61.5 el 30.0",
+        ),
+    ):
+        [row] = [row for row in status_lines(replace(SEEN, sun_deg=12.34, **changes)) if row.startswith("sun")]
+        assert row.split(maxsplit=1)[1].strip() == text

@@ -5,6 +5,7 @@ from acu_daemon.daemon import words
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.daemon.verdict import alarms, verdict
 
+SUN_NEAR_DEG = 20.0  # farther it is not worth a row
 OLD_S = 1.0  # a reading older than this is not where the antenna is
 
 
@@ -38,6 +39,7 @@ def status_rows(seen: Snapshot) -> list[tuple[str, str]]:
         ("signal", _signal(seen)),
         ("prediction", _prediction(seen)),
         ("buffer", _buffer(seen)),
+        ("sun", _sun(seen)),
         ("control", _control(seen)),
         ("ACU", ", ".join(text for text in (seen.acu, seen.acu_mode if seen.is_link_up else "no link") if text)),
         ("late ticks", f"{seen.skipped_tick_count} of {seen.tick_count + seen.skipped_tick_count} skipped"),
@@ -75,6 +77,21 @@ def _pass(seen: Snapshot) -> str:
     when = words.coming(seen).removeprefix(seen.satellite).strip()
     at = words.rise(seen) or (f"at {seen.set_utc[11:]}" if "sets in" in when else "")
     return f"{when} {at}".strip()
+
+
+def _sun(seen: Snapshot) -> str:
+    """How far it is from the beam, and of an antenna that stands how long until its keep-out is there."""
+    if seen.sun_deg is None:
+        return ""
+    if seen.sun_reach_s is None:
+        return f"{seen.sun_deg:.1f} deg from the beam" if seen.sun_deg < SUN_NEAR_DEG else ""
+    when = (
+        f"its keep-out is here in {words.clock_text(seen.sun_reach_s)}" if seen.sun_reach_s else "within its keep-out"
+    )
+    out = ""
+    if seen.way_out_az_deg is not None and seen.way_out_el_deg is not None:
+        out = f", clear of it is az {seen.way_out_az_deg:.1f} el {seen.way_out_el_deg:.1f}"
+    return f"{seen.sun_deg:.1f} deg from the beam, {when}{out}"
 
 
 def _antenna(seen: Snapshot) -> str:
