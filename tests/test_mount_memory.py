@@ -278,7 +278,7 @@ def test_a_pass_far_from_its_elements_or_far_too_noisy_is_left_out_and_why(crook
 # In a session
 
 
-def refitted(setup: RefitSetup, readings: Readings, step_s: float = 30.0) -> list[RefitReply]:
+def refitted(setup: RefitSetup, readings: Readings, step_s: float = 60.0) -> list[RefitReply]:
     refitter, replies = Refitter(setup), []
     first = float(readings.tai_s[0])
     for begin_s in np.arange(0.0, float(readings.tai_s[-1]) - first + step_s, step_s):
@@ -294,7 +294,7 @@ def test_a_session_tells_what_the_pass_says_of_the_pedestal_whatever_estimator_p
     setup = RefitSetup(one.source, HERE, name, SETTINGS, AZIMUTH, memory=memory)
     replies = refitted(setup, read(one, 3))
     estimates = [reply.estimate for reply in replies if reply.estimate is not None]
-    assert 3 <= len(estimates) < len(replies)
+    assert 2 <= len(estimates) < len(replies)
     assert estimates[0].span_s >= 60.0
     assert estimates[-1].at_tai_s == one.readings.tai_s[-1]  # no reading comes any more: the rest is in it
     alone = refitted(replace(setup, memory=None), read(one, 3))

@@ -1,4 +1,4 @@
-"""The daemon with a memory of its antenna, flown: a short lock is enough, a wrong memory is found out, a pass adds."""
+"""The daemon with a memory of its antenna, flown: a short lock is enough, a wrong memory is found out."""
 
 from dataclasses import replace
 
@@ -6,7 +6,6 @@ import numpy as np
 from flights import RISING_TAI_S, climb, demo_target, worst_error_deg
 
 from acu_daemon.assist.mount_memory.pedestal_memory import PedestalMemory, Remembered, first_memory
-from acu_daemon.assist.mount_memory.update import updated
 from acu_daemon.config.to_settings import estimator_settings
 from acu_daemon.units import DEG
 
@@ -39,16 +38,7 @@ def test_after_ten_seconds_of_lock_the_satellite_is_followed_as_if_the_encoders_
 
 def test_a_memory_of_encoders_that_were_re_zeroed_since_is_found_out_and_told() -> None:
     flight = climb(95.0, TARGET, losses=[(80.0, 95.0)], biases_deg=BIASES_DEG, memory=memory_of(0.15, 0.1))
+    assert flight.estimates[-1].doubt.is_rezeroed
     notes = [event["note"] for event in flight.events if event["event"] == "fit.note"]
     assert [note for note in notes if "re-zeroed since the last passes" in note]
     assert worst_error_deg(flight, RISING_TAI_S + 81.0, RISING_TAI_S + 95.0) < 0.1
-
-
-def test_a_flight_tells_what_the_pass_says_of_the_antenna() -> None:
-    memory = first_memory(SETTINGS, RISING_TAI_S)
-    flight = climb(80.0, TARGET, biases_deg=BIASES_DEG, memory=memory)
-    seen = flight.estimates[-1]
-    assert seen.span_s > 60.0
-    after = updated(memory, seen, SETTINGS)
-    assert after.why_not == ""
-    assert after.memory.pass_count == 1
