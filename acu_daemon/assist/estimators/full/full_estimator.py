@@ -11,7 +11,7 @@ from acu_daemon.assist.estimators.full.elements_discrepancy import describe_disc
 from acu_daemon.assist.estimators.full.estimated_states import Prior, bias_of, correction_of, make_prior, shift_of
 from acu_daemon.assist.estimators.full.least_squares import Batch, Solution, solve
 from acu_daemon.assist.estimators.full.normal_points import Sights, sights
-from acu_daemon.assist.estimators.full.pedestal_prior import LOG_ODDS, Doubt, PedestalPrior, doubt_of
+from acu_daemon.assist.estimators.full.pedestal_prior import LOG_ODDS, Doubt, PedestalPrior, doubt_of, with_shift
 from acu_daemon.assist.estimators.full.prior_inflation import WIDTHS, is_strained, most_likely
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import Correction, FitResult, Readings, Site
@@ -134,7 +134,16 @@ class FullEstimator(BaseEstimator):
         if before is not self._is_rezeroed:
             self.pedestal_notes.append(_why_rezeroed(doubt) if self._is_rezeroed else TRUSTED_AGAIN)
             solution = solve(WIDTHS[self._width].of(batch), seen, solution)
+        elif not before and self._explains_strain(doubt, rezeroed, solution):
+            return solution
         return self._widened(batch, seen, solution)
+
+    def _explains_strain(self, doubt: Doubt, rezeroed: Batch, solution: Solution) -> bool:
+        """Whether re-zeroed encoders are as good a reason as worse elements: then more readings decide, no width."""
+        if self._pedestal is None or doubt.log_evidence <= 0.0:
+            return False
+        shifted = replace(solution, x=with_shift(self._pedestal, solution.x, solution.covariance, doubt))
+        return not is_strained(WIDTHS[self._width].of(rezeroed), shifted)
 
     @property
     def seen(self) -> Sights | None:
