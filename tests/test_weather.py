@@ -158,6 +158,10 @@ def test_the_pass_is_planned_anew_where_the_air_has_changed_and_not_for_less(tmp
         assert watch.on(target).station.site.antenna == first
         assert await looked(watch, temperature_c=10.0)
         assert watch.on(target).station.site.antenna != first
+        file.write_bytes(text_of(utc=utc_text(NOW_TAI_S), temperature_c=25.0))
+        assert watch.on(target, NOW_TAI_S).station.atmosphere.temperature_c == 25.0
+        other = demo_target(atmosphere={"refraction": True, "temperature_c": 1.0})
+        assert watch.on(other, NOW_TAI_S) == other
 
     asyncio.run(main())
 

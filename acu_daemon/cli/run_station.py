@@ -18,6 +18,7 @@ from acu_daemon.cli.kept import Kept, open_kept
 from acu_daemon.cli.options import Target, load_target
 from acu_daemon.cli.run_setup import make_job
 from acu_daemon.cli.station_day import MOVE_S, Beside, StationDay, move_to
+from acu_daemon.cli.weather_watch import WeatherWatch
 from acu_daemon.config.load import satellite_names
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tracking.approach import Way, way_s
@@ -107,6 +108,7 @@ class StationRuns:
         self._notifier = Notifier()
         self._health = Health(self._notifier)
         self._snapshots = SnapshotFile(setup.directory, setup.files, 1)
+        self._weather = WeatherWatch(setup.config, first, setup.clock.tai_s())
         self._service: Service | None = None
         self._kept: Kept | None = None
         self._memory: ControlState | None = None
@@ -129,6 +131,13 @@ class StationRuns:
 
     async def run(self) -> Outcome:
         """Run until it is stopped.  Raises: NoAcuError: no good poll at the start."""
+        await self._weather.open()
+        try:
+            return await self._runs()
+        finally:
+            self._weather.close()
+
+    async def _runs(self) -> Outcome:
         outcome = await self._pass() if self.day.look() else None
         outcome = outcome or await self._rest()
         while not self._stop_reason and outcome.reason != "duration over":
@@ -170,6 +179,7 @@ class StationRuns:
             return None
         try:
             target, coming = self.day.begin(entry)
+            target = self._weather.on(target, self._setup.clock.tai_s())
             if self._kept is not None:
                 self._kept.flush()
             self._kept = open_kept(
@@ -243,6 +253,7 @@ class StationRuns:
             runner,
             on_snapshot=self._show,
             on_fit=kept.offer if job.coming is not None and not job.control.is_resting else None,
+            on_estimate=kept.mount.offer if job.coming is not None and not job.control.is_resting else None,
             on_state=kept.see,
             on_end=self._on_end,
             files_alarm=self._files_alarm,

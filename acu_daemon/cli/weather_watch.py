@@ -37,8 +37,13 @@ class WeatherWatch:
     def close(self) -> None:
         self._reader.close()
 
-    def on(self, target: Target) -> Target:
-        """The target in the air in force."""
+    def on(self, target: Target, now_tai_s: float | None = None) -> Target:
+        """The target in the air in force.  now_tai_s: look at it first, as where a pass begins."""
+        if target.station.atmosphere != self._given:  # read again with other values: they hold until the next start
+            return target
+        if now_tai_s is not None and self._given.has_live_weather and self._reading is None:
+            self.in_force = self._read(now_tai_s)
+            self._reader.tell()
         if target.station.atmosphere == self.in_force:
             return target
         return replace(target, station=target.station.model_copy(update={"atmosphere": self.in_force}))
