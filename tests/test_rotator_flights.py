@@ -7,6 +7,7 @@ from pathlib import Path
 import config_files
 import numpy as np
 import pytest
+from command_line import acu_daemon
 from conftest import DATA
 from driver_benches import TaggedOnBench
 from rotators import Habits, Rotator, RotatorFlight, fly_rotator
@@ -238,3 +239,9 @@ def test_a_rehearsal_runs_on_no_real_rotator(tmp_path: Path) -> None:
         fly_rotator(target, rotator, begin, begin + 10.0)
     assert [order for order in rotator.orders if order[1].startswith("P")] == []
     assert math.isclose(rotator.place[0], 0.0)
+
+
+def test_the_simulated_acu_is_none_for_a_rotator_and_says_what_is(tmp_path: Path) -> None:
+    done = acu_daemon("fake-acu", "--config", config_files.write(tmp_path, STATION), "--satellite", "scd")
+    assert done.code == 2
+    assert "rotctld -m 1" in done.err

@@ -26,6 +26,9 @@ from acu_daemon.sim.server import ADVANCE_S, acu_peer, keep_time
 from acu_daemon.sim.trace import TraceWriter
 from acu_daemon.sim.wire_log import WireLogWriter
 
+SIMULATED_DIALECT = "sa3842"
+OTHERS = "for a rotator start Hamlib's dummy in its place: rotctld -m 1 -T HOST -t PORT"
+
 
 def command(
     config: Config,
@@ -85,7 +88,10 @@ def command(
     """
     if listen is not None and pty is not None:
         raise UsageError("--listen and --pty exclude each other")
-    place = _where(listen, pty, load_station(config).acu.url)
+    acu_section = load_station(config).acu
+    if acu_section.dialect != SIMULATED_DIALECT:
+        raise UsageError(f'[acu] dialect = "{acu_section.dialect}": fake-acu is a simulated SA-3842; {OTHERS}')
+    place = _where(listen, pty, acu_section.url)
     clock, met = meet_in_rehearsal(place.url, Role.ACU, at, at_monotonic)
     target = load_target(config, satellite, clock.tai_s(), is_strict=False)
     target = nearest_to_pass(config, satellite, target, clock.tai_s(), is_strict=False)  # as the daemon chooses

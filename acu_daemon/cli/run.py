@@ -131,7 +131,9 @@ def command(
     Polls the ACU, writes its registers ten times a second, fits the orbit while the signal is locked and steers by the
     prediction while it is not.  Ends after the pass, after --duration, on SIGTERM or Ctrl-C, with a safe stop.
 
-    Exit status: 0 done; 1 the satellite was never acquired, or the antenna could not be stopped; 2 wrong use or
+    Without a signal ([receiver] signal = "none", a rotator) the pass is flown by program track.
+
+    Exit status: 0 done; 1 the satellite was never acquired (where there is a signal to acquire), or the antenna could not be stopped; 2 wrong use or
     configuration; 3 no ACU within 10 s.
     """
     os.umask(0o027)  # what is left belongs to this user and its group
