@@ -13,7 +13,9 @@ ABOVE = ("acu", "assist", "control", "daemon", "edge", "orbit", "report", "sched
 COMPOSITION = {
     "cli/demo.py",  # a simulated SA-3842 without a daemon stands beside the one with it
     "cli/fake_acu.py",
+    "cli/rehearse.py",  # the simulated one is chosen for a rehearsal
     "cli/virtual_pass.py",
+    "cli/virtual_station.py",
 }
 DRIVERS = re.compile(r"acu_daemon\.drivers")
 WORDS = re.compile(

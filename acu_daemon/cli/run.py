@@ -133,8 +133,8 @@ def command(
 
     Without a signal ([receiver] signal = "none", a rotator) the pass is flown by program track.
 
-    Exit status: 0 done; 1 the satellite was never acquired (where there is a signal to acquire), or the antenna could not be stopped; 2 wrong use or
-    configuration; 3 no ACU within 10 s.
+    Exit status: 0 done; 1 the satellite was never acquired, of a station with a signal, or the antenna could not be
+    stopped; 2 wrong use or configuration; 3 no ACU within 10 s.
     """
     os.umask(0o027)  # what is left belongs to this user and its group
     if not faulthandler.is_enabled():
