@@ -1,6 +1,6 @@
 """Everything of the TOML files that the decision of a tick depends on."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from acu_daemon.acu.capabilities import Capabilities
@@ -42,11 +42,9 @@ class ControlConfig:
     response_time_s: float = 60.0  # an antenna that may not be moved, and that the sun reaches within it, is an alarm
     has_signal: bool = True  # autotrack gives one; else a pass is flown by program track
     clock_alarm_deg: float = 0.1  # an error of UTC counts from here on, at the sky's present rate
+    azimuth: AxisLimits = field(init=False)  # the envelope's
+    elevation: AxisLimits = field(init=False)
 
-    @property
-    def azimuth(self) -> AxisLimits:
-        return self.envelope.azimuth
-
-    @property
-    def elevation(self) -> AxisLimits:
-        return self.envelope.elevation
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "azimuth", self.envelope.azimuth)
+        object.__setattr__(self, "elevation", self.envelope.elevation)

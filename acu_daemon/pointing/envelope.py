@@ -7,7 +7,7 @@ plunges: there the beam points to the other side, and zones and skyline are aske
 Angles are those of the encoders, azimuth continuous.  Without zones and sun nothing is computed beside the limits.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 
 import numpy as np
@@ -34,11 +34,11 @@ class Envelope:
     skyline: Skyline | None = None
     mount: Mount | None = None  # None: the encoders show the beam's direction
     stow_deg: tuple[float, float] | None = None  # where the ACU's own stow position is; None: not known
+    has_zones: bool = field(init=False)  # whether the beam keeps out of anything
 
-    @property
-    def has_zones(self) -> bool:
-        """Whether the beam keeps out of anything."""
-        return bool(self.keep_outs) or (self.sun is not None and self.sun.policy == "avoid")
+    def __post_init__(self) -> None:
+        is_avoided = self.sun is not None and self.sun.policy == "avoid"
+        object.__setattr__(self, "has_zones", bool(self.keep_outs) or is_avoided)
 
     @property
     def may_plunge(self) -> bool:
@@ -127,10 +127,13 @@ class Envelope:
 
     def why_not(self, az_deg: float, el_deg: float, tai_s: float, slack_deg: float = 0.0) -> str:
         """Why the antenna must not be sent there; empty: it may.  slack_deg: beyond a limit, for what is rounded."""
-        if beyond := self.beyond_limits(az_deg, el_deg, slack_deg):
-            return beyond
-        zone = self.zone_at(az_deg, el_deg, tai_s)
-        return "" if zone is None else f"within the keep-out of {zone.name}"
+        azimuth, elevation = self.azimuth, self.elevation
+        is_within = azimuth.min_deg - slack_deg <= az_deg <= azimuth.max_deg + slack_deg
+        if not is_within or not elevation.min_deg - slack_deg <= el_deg <= elevation.max_deg + slack_deg:
+            return self.beyond_limits(az_deg, el_deg, slack_deg)
+        if not self.has_zones or (zone := self.zone_at(az_deg, el_deg, tai_s)) is None:
+            return ""
+        return f"within the keep-out of {zone.name}"
 
     def beyond_limits(self, az_deg: float, el_deg: float, slack_deg: float = 0.0) -> str:
         """Which axis does not reach a place, and its limits; empty: both do."""

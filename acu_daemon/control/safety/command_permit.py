@@ -98,7 +98,9 @@ def _of_write(az_deg: float, el_deg: float, state: ControlState, now_tai_s: floa
 
 def of_angles(az_deg: float, el_deg: float, now_tai_s: float, envelope: Envelope, step_deg: float) -> str:
     """Why registers must not be written with such angles; empty: they may."""
-    for name, angle_deg in (("azimuth", az_deg), ("elevation", el_deg)):
-        if not isfinite(angle_deg):
-            return f"{name} is not a finite angle"
-    return envelope.why_not(az_deg, el_deg, now_tai_s, step_deg)
+    refused = envelope.why_not(az_deg, el_deg, now_tai_s, step_deg)
+    if refused:  # what is not finite is within no limits
+        for name, angle_deg in (("azimuth", az_deg), ("elevation", el_deg)):
+            if not isfinite(angle_deg):
+                return f"{name} is not a finite angle"
+    return refused
