@@ -168,3 +168,4 @@ def test_a_satellite_without_a_name_is_called_by_its_number(tmp_path: Path) -> N
     assert made(tmp_path / "station", *STATION, "--elements", tmp_path / "one.tle", "--satellite", "99901").code == 0
     assert satellite_names(tmp_path / "station") == ["99901"]
     assert file_word("Amazônia 1 [+]") == "amazonia-1"
+    assert file_word("NOAA 20 (JPSS-1)") == "noaa-20"

@@ -84,6 +84,7 @@ def toml_value(value: Value) -> str:
 
 
 def file_word(name: str) -> str:
-    """A satellite's name as the name of its file, such as noaa-20."""
-    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
+    """A satellite's name as the name of its file, without what stands in brackets: NOAA 20 (JPSS-1) is noaa-20."""
+    bare = re.sub(r"[(\[].*?[)\]]", "", name)
+    plain = unicodedata.normalize("NFKD", bare).encode("ascii", "ignore").decode()
     return re.sub(r"[^a-z0-9]+", "-", plain.lower()).strip("-")
