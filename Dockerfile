@@ -1,7 +1,8 @@
 FROM python:3.11-slim
 # An init: the first process of a container gets no signal that it has no handler for, not even the stop.
 RUN apt-get update && apt-get install -y --no-install-recommends tini && rm -rf /var/lib/apt/lists/*
-RUN useradd --system --create-home --home-dir /var/lib/acu-daemon --groups dialout acu && install -d -o acu -g acu /var/lib/acu-daemon-rehearsal
+RUN useradd --system --create-home --home-dir /var/lib/acu-daemon --groups dialout acu
+RUN install -d -o acu -g acu /var/lib/acu-daemon-rehearsal
 WORKDIR /opt/acu-daemon
 COPY pyproject.toml constraints.txt README.md LICENSE ./
 COPY acu_daemon acu_daemon
