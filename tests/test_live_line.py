@@ -11,7 +11,7 @@ import pytest
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.daemon.health import status_line
 from acu_daemon.daemon.live import LiveLine, live_text
-from acu_daemon.daemon.overview import status_lines
+from acu_daemon.daemon.overview import status_lines, steering
 from acu_daemon.daemon.snapshot import Snapshot, snapshot_of
 from acu_daemon.daemon.verdict import Level, verdict
 from acu_daemon.orbit.timescales import tai_from_utc
@@ -341,3 +341,8 @@ def test_status_has_a_row_for_a_sun_that_is_near_or_comes() -> None:
     ):
         [row] = [row for row in status_lines(replace(SEEN, sun_deg=12.34, **changes)) if row.startswith("sun")]
         assert row.split(maxsplit=1)[1].strip() == text
+
+
+def test_of_every_state_it_is_said_what_steers() -> None:
+    for state in TrackState:
+        assert steering(replace(SEEN, state=str(state))).endswith(f"({state})")

@@ -31,6 +31,7 @@ def status_rows(seen: Snapshot) -> list[tuple[str, str]]:
         ("time", seen.utc),
         ("satellite", f"{seen.satellite}, over {seen.station}" if seen.station else seen.satellite),
         ("pass", _pass(seen)),
+        ("zenith", seen.zenith),
         ("elements", "; ".join(text for text in (seen.elements, seen.elements_problem) if text)),
         ("steers", steering(seen)),
         ("antenna", _antenna(seen)),

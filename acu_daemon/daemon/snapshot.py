@@ -95,6 +95,7 @@ class Snapshot:
     rise_in_s: float | None = None  # negative: the pass has begun
     set_in_s: float | None = None
     culmination_deg: float | None = None
+    zenith: str = ""  # what crossing it is expected to cost, until it is past
     sun_deg: float | None = None  # between boresight and sun; None where sun_policy is off
     sun_reach_s: float | None = None  # until the sun's keep-out is where the antenna stands; None: not within an hour
     way_out_az_deg: float | None = None  # where it could stand clear of the sun

@@ -5,6 +5,7 @@ from math import isfinite
 
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState
+from acu_daemon.control.tick_input import Sky
 from acu_daemon.control.tracking.hills import hidden_until_tai_s, is_hidden
 from acu_daemon.control.tracking.off_path import off_path
 from acu_daemon.control.tracking.scan import covered_text
@@ -17,6 +18,7 @@ from acu_daemon.daemon.snapshot import Snapshot, Subject
 from acu_daemon.daemon.verdict import verdict
 from acu_daemon.model import Prediction, Reading, sky_angle_deg
 from acu_daemon.orbit.timescales import utc_text
+from acu_daemon.pointing.reach import zenith_text
 
 LATENESS_TICKS = 100  # the newest ten seconds
 
@@ -68,6 +70,7 @@ def take_snapshot(
         rise_in_s=coming.rise_tai_s - now_tai_s if coming else None,
         set_in_s=coming.set_tai_s + late_s - now_tai_s if coming else None,
         culmination_deg=coming.culmination_el_deg if coming else None,
+        zenith=_zenith(area.sky, now_tai_s),
     )
     return replace(seen, verdict=verdict(seen).word)
 
@@ -137,6 +140,13 @@ def _seen(
         rejecting=area.gate.rejecting if state.tracking.track in AUTOTRACKING else "",
         rejected_counts=area.rejected_counts,
     )
+
+
+def _zenith(sky: Sky, now_tai_s: float) -> str:
+    """The crossing that is ahead, by the fit or, before it is in the buffer, by the plan."""
+    crossing = sky.prediction.crossing if sky.prediction is not None else None
+    crossing = crossing or (sky.plan.crossing if sky.plan is not None else None)
+    return zenith_text(crossing) if crossing is not None and now_tai_s < crossing.return_tai_s else ""
 
 
 def _arming(state: ControlState, control: ControlConfig) -> str:

@@ -13,7 +13,7 @@ from acu_daemon.control.tracking.hills import came_out_tai_s, is_hidden
 from acu_daemon.control.tracking.pass_plan import pass_end_tai_s
 from acu_daemon.control.tracking.register_limiter import within_limits
 from acu_daemon.control.tracking.state_table import HOLDING, LED, Cause, TrackState
-from acu_daemon.control.tracking.track_frame import extents, is_within, offset_of
+from acu_daemon.control.tracking.track_frame import extents, is_within, offset_of, three_sigma_of
 from acu_daemon.control.tracking.zone_watch import nears_zone
 from acu_daemon.model import Pointing, sky_angle_deg
 from acu_daemon.pointing.wrap import nearest_turn
@@ -24,6 +24,7 @@ RESUME_DEG = 5.0  # an antenna this near to the path goes on from an interruptio
 BEFORE = frozenset({TrackState.IDLE, TrackState.PREPOSITION})  # only there it matters where the antenna stands
 TO_AUTOTRACK = frozenset({Cause.ON_POINT, Cause.ON_POINT_FITTED, Cause.STILL_FITTED, Cause.STILL_SELECTED})
 TAKEOVER_S, GIVE_BACK_S = 2.0, 0.5  # before the departure, and after the return: a crossing of the zenith
+GLANCE_S = 3.0  # on the path, before a search: where the prediction is not sure to be within the beam
 LEAVING_S = 15.0  # after a false lock; then autotrack is selected wherever the antenna is
 CHANGED_S = 3.0  # by which a fit may put off a crossing that the antenna was taken over for
 TAKEOVER_RATES = 1.2  # of the drive's rate: what autotrack cannot follow
@@ -218,6 +219,17 @@ def _distance_deg(state: ControlState, status: AcuStatus, target: Pointing) -> f
     return sky_angle_deg(state.intake.az_deg, status.el_deg, target.az_deg, target.el_deg) - lag_deg
 
 
+def _unsure_s(sky: Sky, now_tai_s: float, config: ControlConfig) -> float | None:
+    """3 sigma along the track, s, where the prediction is not sure to lie within half a beam; None where it is."""
+    three_sigma, path = three_sigma_of(sky.prediction), path_point(sky, now_tai_s)
+    if three_sigma is None or path is None or not path.is_finite or sky.prediction is None:
+        return None
+    at_rise = sky.prediction.at(max(now_tai_s, sky.prediction.start_tai_s)) or path
+    speed_deg_s = hypot(at_rise.az_rate_deg_s * cos(radians(at_rise.el_deg)), at_rise.el_rate_deg_s)
+    off_deg = max(three_sigma[0] * speed_deg_s, three_sigma[1])
+    return three_sigma[0] if off_deg > config.beamwidth_deg / 2.0 else None
+
+
 def _of_time(state: ControlState, status: AcuStatus, given: TickInput, config: ControlConfig) -> set[Cause]:
     sky, now_tai_s, track = given.sky, given.now_tai_s, state.tracking.track
     in_state_s = now_tai_s - state.tracking.entered_tai_s
@@ -227,8 +239,11 @@ def _of_time(state: ControlState, status: AcuStatus, given: TickInput, config: C
     if is_left and in_state_s > MODE_SETTLE_S:
         causes.add(Cause.MODE_LEFT)
     if track is TrackState.ACQUIRE_TLE and sky.plan is not None:
-        waiting_s = now_tai_s - max(state.tracking.entered_tai_s, came_out_tai_s(sky, now_tai_s))
-        if waiting_s > config.acquire_s and not is_hidden(sky, now_tai_s, config):
+        early_s = _unsure_s(sky, now_tai_s, config)
+        patience_s = config.acquire_s if early_s is None else min(config.acquire_s, GLANCE_S)
+        begins_tai_s = came_out_tai_s(sky, now_tai_s) - min(early_s or 0.0, ACQUIRE_LEAD_S)
+        waiting_s = now_tai_s - max(state.tracking.entered_tai_s, begins_tai_s)
+        if waiting_s > patience_s and not is_hidden(sky, now_tai_s, config):
             causes.add(Cause.ACQUIRE_OVER)
     is_glimpse = track is TrackState.HOLD_TLE and not state.signal.has_locked  # nothing worth a long hold
     hold_s = min(config.hold_s, config.acquire_s) if is_glimpse else config.hold_s
