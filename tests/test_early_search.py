@@ -1,4 +1,4 @@
-"""Elements that are wrong by more than the beam: the satellite is looked for from before its rise on."""
+"""Elements that are wrong by more than the beam: the satellite is looked for from its rise on."""
 
 import numpy as np
 import pytest

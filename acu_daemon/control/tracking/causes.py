@@ -15,7 +15,7 @@ from acu_daemon.control.tracking.register_limiter import within_limits
 from acu_daemon.control.tracking.state_table import HOLDING, LED, Cause, TrackState
 from acu_daemon.control.tracking.track_frame import extents, is_within, offset_of, three_sigma_of
 from acu_daemon.control.tracking.zone_watch import nears_zone
-from acu_daemon.model import Pointing, sky_angle_deg
+from acu_daemon.model import Model, Pointing, sky_angle_deg
 from acu_daemon.pointing.wrap import nearest_turn
 
 ON_POINT_BEAMS = 0.25
@@ -241,7 +241,8 @@ def _of_time(state: ControlState, status: AcuStatus, given: TickInput, config: C
     if track is TrackState.ACQUIRE_TLE and sky.plan is not None:
         early_s = _unsure_s(sky, now_tai_s, config)
         patience_s = config.acquire_s if early_s is None else min(config.acquire_s, GLANCE_S)
-        begins_tai_s = came_out_tai_s(sky, now_tai_s) - min(early_s or 0.0, ACQUIRE_LEAD_S)
+        is_carried = sky.prediction is not None and sky.prediction.model is Model.LAST_PASS
+        begins_tai_s = came_out_tai_s(sky, now_tai_s) - (min(early_s or 0.0, ACQUIRE_LEAD_S) if is_carried else 0.0)
         waiting_s = now_tai_s - max(state.tracking.entered_tai_s, begins_tai_s)
         if waiting_s > patience_s and not is_hidden(sky, now_tai_s, config):
             causes.add(Cause.ACQUIRE_OVER)
