@@ -4,7 +4,6 @@ import os
 import re
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -57,11 +56,20 @@ def test_the_scenario_of_a_rehearsal_loses_the_signal_twice_within_it_and_can_be
     assert read_scenario(rehearse._scenario(flown, None, has_losses=False)).losses == ()
 
 
-def test_the_antenna_of_a_rehearsal_stands_within_its_limits() -> None:
-    limits = rehearse.AxisLimits(10.0, 350.0, 1.0, 1.0)
-    assert rehearse._within(370.0, limits, 360.0) == pytest.approx(10.0)
-    assert rehearse._within(5.0, limits, 360.0) == pytest.approx(350.0)
-    assert rehearse._within(2.0, replace(limits, min_deg=15.0), None) == pytest.approx(15.0)
+@pytest.mark.parametrize(
+    ("az_deg", "low_deg", "high_deg", "stands_deg"),
+    [
+        (100.0, -270.0, 270.0, 100.0),
+        (300.0, -270.0, 270.0, -60.0),
+        (355.0, 0.0, 450.0, 355.0),
+        (2.0, 10.0, 350.0, 10.0),
+    ],
+)
+def test_the_antenna_of_a_rehearsal_stands_at_the_rise_within_its_limits_with_room_either_way(
+    az_deg: float, low_deg: float, high_deg: float, stands_deg: float
+) -> None:
+    limits = rehearse.AxisLimits(low_deg, high_deg, 1.0, 1.0)
+    assert rehearse._held(rehearse._in_the_middle(az_deg, limits), limits) == pytest.approx(stands_deg)
 
 
 def test_another_acu_is_for_a_rehearsal_or_is_said_to_move_the_same_antenna(tmp_path: Path) -> None:

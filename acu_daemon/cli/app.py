@@ -114,7 +114,7 @@ HELP = """
       acu-daemon run --config config --satellite scd-1 --at 1989-02-01T01:58:30Z
 
     `acu-daemon status --rehearsal` in another terminal tells what it does; Ctrl-C stops it safely.  Then your own
-    station: its numbers in a station.toml, a TOML file for each satellite (README.md), and the same without --at.
+    station: `acu-daemon init DIR` writes its files, `acu-daemon rehearse` flies its next pass now (docs/tutorial.md).
 
     Exit status: 0 done, 1 the check or the pass failed, 2 wrong use or configuration, 3 no ACU within 10 s, 4 internal
     error.

@@ -31,9 +31,10 @@ from acu_daemon.errors import AcuDaemonError, UsageError
 from acu_daemon.model import AxisLimits, Pass
 from acu_daemon.orbit.look import apparent_at
 from acu_daemon.orbit.timescales import utc_text
+from acu_daemon.pointing.wrap import middle_deg
 from acu_daemon.report.pass_trace import Figures, figures_table, measure, read_trace, until
 from acu_daemon.sim.scenario import read_scenario
-from acu_daemon.units import DAY_S
+from acu_daemon.units import DAY_S, wrap_180
 
 LEAD_S = 4.0  # until both processes have loaded; the rehearsed time begins after it
 BEFORE_S = 30.0
@@ -182,15 +183,17 @@ def _first_direction(flown: Rehearsal) -> tuple[float, float]:
     """Where the satellite is first, as far as the axes reach, in degrees of the encoders."""
     begin_tai_s = max(flown.start_tai_s, flown.coming.rise_tai_s)
     seen = apparent_at(flown.target.elements.propagator, np.array([begin_tai_s]), flown.target.station.site)
-    acu = flown.target.station.acu
-    return _within(float(seen.az_deg[0]), acu.azimuth.limits(), 360.0), _within(
-        float(seen.el_deg[0]), acu.elevation.limits(), None
-    )
+    azimuth, elevation = flown.target.station.acu.azimuth.limits(), flown.target.station.acu.elevation.limits()
+    return _held(_in_the_middle(float(seen.az_deg[0]), azimuth), azimuth), _held(float(seen.el_deg[0]), elevation)
 
 
-def _within(angle_deg: float, limits: AxisLimits, turn_deg: float | None) -> float:
-    if turn_deg is not None:  # the lowest of the turns that the axis has
-        angle_deg = limits.min_deg + (angle_deg - limits.min_deg) % turn_deg
+def _in_the_middle(az_deg: float, limits: AxisLimits) -> float:
+    """The turn of a bearing that leaves the cable most room either way."""
+    middle = middle_deg(limits)
+    return middle + wrap_180(az_deg - middle)
+
+
+def _held(angle_deg: float, limits: AxisLimits) -> float:
     return min(max(angle_deg, limits.min_deg), limits.max_deg)
 
 
