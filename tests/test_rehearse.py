@@ -110,3 +110,22 @@ def test_a_pass_of_tonight_is_rehearsed_with_one_command_and_the_stations_own_ac
     trace = read_trace(out / "trace.csv")
     assert measure(until(trace, float(trace.tai_s[-20])), 1.0).seconds < measure(trace, 1.0).seconds
     assert figures_table({"this": measure(trace, 1.0)})[0].startswith("SIMULATION")
+
+
+def test_a_rehearsal_that_was_ended_early_says_so_and_claims_nothing_of_losses_that_it_did_not_fly(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    flown = rehearse._planned(scd(tmp_path), NOW, 0.0, None, 0, tmp_path)
+    head = "utc,boresight_az_deg,boresight_el_deg,satellite_az_deg,satellite_el_deg,beam_error_deg,mode,acquired,signal"
+    rows = [
+        f"{utc_text(flown.start_tai_s + 0.1 * k, 3)},10,{5 + 0.01 * k},10,{5 + 0.01 * k},0.01,AUTOTRACK,1,1"
+        for k in range(80)
+    ]
+    (tmp_path / "trace.csv").write_text("\n".join([head, *rows]) + "\n")
+    assert rehearse._report(flown, tmp_path / "scenario.toml")
+    told = capsys.readouterr().out
+    assert "Ended early, after 0:08 of " in told
+    assert "throughout." in told
+    (tmp_path / "trace.csv").write_text("\n".join([head, *(row.replace(",1,1", ",0,1") for row in rows)]) + "\n")
+    assert not rehearse._report(flown, tmp_path / "scenario.toml")
+    assert "never acquired" in capsys.readouterr().out

@@ -41,6 +41,7 @@ BEFORE_S = 30.0
 SIMULATED_DIALECT = "sa3842"
 MOST_BEFORE_S = 3600.0
 LEAST_FLOWN_S = 5.0
+OWN_END_S = 1.0  # of the trace: the daemon's own stop
 ALONG_TRACK_S, ENCODER_NOISE_DEG = 0.5, 0.02  # what the elements and the encoders are wrong by
 FIRST_LOSS, SECOND_LOSS, LONGEST_LOSS_S = (0.35, 0.08), (0.65, 0.08), 60.0  # begin and length, shares of what is flown
 ENDS_S = 20.0  # for the simulated ACU to write what it has and end
@@ -258,7 +259,9 @@ def _report(flown: Rehearsal, scenario: Path) -> bool:
     from acu_daemon.report.plot import plot_passes  # matplotlib is slow to load, and no other command needs it
 
     beamwidth_deg = flown.target.station.receiver.beamwidth_deg
-    trace = until(read_trace(flown.out / TRACE), flown.end_tai_s - 1.0)  # what the daemon's own end does not touch
+    whole = read_trace(flown.out / TRACE)
+    end_tai_s = min(flown.end_tai_s, float(whole.tai_s[-1])) if whole.tai_s.size else flown.end_tai_s
+    trace = until(whole, end_tai_s - OWN_END_S)
     try:
         figures = measure(trace, beamwidth_deg)
     except ValueError as error:
@@ -267,6 +270,9 @@ def _report(flown: Rehearsal, scenario: Path) -> bool:
     title = f"SIMULATION, REHEARSAL: {flown.target.elements.label} over {flown.target.station.station.name}"
     plot_passes(flown.out / PICTURE, {"this station": trace}, beamwidth_deg, f"{title}, {utc_text(trace.tai_s[0], 0)}")
     typer.echo("\nREHEARSAL\n" + "\n".join(figures_table({"this station": figures})))
+    if end_tai_s < flown.end_tai_s - OWN_END_S:
+        flown_s = max(end_tai_s - flown.start_tai_s, 0.0)
+        typer.echo(f"\nEnded early, after {clock_text(flown_s)} of {clock_text(flown.seconds)}.")
     typer.echo(f"\n{_in_words(figures)}")
     for name, file in (("picture", PICTURE), ("trace", TRACE), ("readings", READINGS)):
         typer.echo(f"{name:10} {flown.out / file}")
@@ -276,7 +282,8 @@ def _report(flown: Rehearsal, scenario: Path) -> bool:
 
 def _in_words(figures: Figures) -> str:
     if figures.is_on_satellite_at_end and figures.seconds_on_satellite >= (1.0 - 0.02) * figures.seconds:
-        return "The antenna was on the satellite throughout, also while there was no signal."
+        also = ", also while there was no signal" if figures.seconds_without_signal > 0.0 else ""
+        return f"The antenna was on the satellite throughout{also}."
     if figures.is_on_satellite_at_end:
         return "The antenna was on the satellite at the end; the picture shows where it was not in between, and why."
     return "The antenna was not on the satellite at the end: see the picture, and `acu-daemon check` for the limits."
