@@ -9,7 +9,7 @@ from real_passes import sky_angles_deg
 
 from acu_daemon.model import AxisLimits, ZenithCrossing
 from acu_daemon.pointing.axis import AxisState, step
-from acu_daemon.pointing.keyhole import Begun, KeyholeRules, SkyPath, follow_path, longest_window_s
+from acu_daemon.pointing.keyhole import Begun, KeyholeRules, SkyPath, follow_path, longest_window_s, turned_past_zenith
 
 DRIVE = AxisLimits(-270.0, 270.0, 20.0, 10.0)
 LARGEST_ERROR, SECONDS = KeyholeRules(DRIVE), KeyholeRules(DRIVE, objective="seconds")
@@ -141,6 +141,25 @@ def test_a_rotator_of_3_degrees_a_second_keeps_the_zenith_within_a_beam_of_20_de
         way, crossing = follow_path(path_of(rows), rules)
         assert errors_deg(way, rows).max() < 10.0
         assert crossing.lost_s == 0.0
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_past_the_zenith_an_antenna_may_turn_the_other_way_round(sign):
+    """It costs little more near the zenith; a path that does not come near has no other way."""
+    rows = zenith_bound.overhead_pass(705, 89.9)
+    rows[1], rows[3] = sign * rows[1], sign * rows[3]
+    turns = 1 if rows[1][-1] > rows[1][0] else -1
+    assert np.array_equal(turned_past_zenith(rows[1], rows[3], turns), rows[1])
+    turned = turned_past_zenith(rows[1], rows[3], -turns)
+    assert np.allclose((turned - rows[1]) % 360.0, 0.0)
+    way, crossing = follow_path(SkyPath(turned, rows[2], rows[3], rows[4], STEP_S), LARGEST_ERROR)
+    assert _within_the_drive(way)
+    assert np.sign(way.az_deg[-1] - way.az_deg[0]) == -turns
+    assert errors_deg(way, rows).max() == pytest.approx(crossing.largest_error_deg, abs=1e-6)
+    assert BOUNDS[705, 89.99][0] < crossing.largest_error_deg < 1.2
+    low = zenith_bound.overhead_pass(705, 80.0)
+    assert np.array_equal(turned_past_zenith(low[1], low[3], 1), low[1])
+    assert np.array_equal(turned_past_zenith(low[1], low[3], -1), low[1])
 
 
 @pytest.mark.parametrize("shift_s", [-46.0, -45.0, -42.0, 42.0, 44.9])
