@@ -55,6 +55,16 @@ def test_the_skyline_is_straight_between_its_points_and_over_north(az_deg: float
     assert skyline.heights_deg(np.array([az_deg, az_deg + 360.0])) == pytest.approx(height_deg)
 
 
+def test_a_skyline_is_the_same_wherever_north_lies_between_its_points() -> None:
+    points = ((0.0, 4.0), (35.0, 11.0), (90.0, 10.0), (180.0, 2.0), (260.0, 21.0), (350.0, 1.0))
+    az_deg = np.arange(-720.0, 720.0, 3.7)
+    as_it_is = [skyline_of(points).height_deg(one) for one in az_deg]
+    for turned_deg in range(0, 360, 15):
+        turned = skyline_of(tuple(((az + turned_deg) % 360.0, el) for az, el in points))
+        assert [turned.height_deg(one + turned_deg) for one in az_deg] == pytest.approx(as_it_is)
+        assert turned.heights_deg(az_deg + turned_deg) == pytest.approx(as_it_is)
+
+
 def test_a_skyline_of_one_point_is_level_and_of_none_or_two_at_one_azimuth_is_refused() -> None:
     assert skyline_of(((123.0, 7.0),)).height_deg(300.0) == 7.0
     assert skyline_of(((0.0, 7.0), (360.0, 7.0))) == Skyline((0.0,), (7.0,))

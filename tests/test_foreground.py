@@ -42,6 +42,7 @@ class ScriptedPort:
     silence_s: float = 0.07
     connect_count: int = 0
     both_s: float = 0.02
+    no_contact: str = ""
     first: Answer | None = None
     is_sure: bool = True
     takes_s: float = 0.01

@@ -135,6 +135,25 @@ def test_what_was_learned_beside_one_model_is_not_put_beside_another() -> None:
     assert orders.first.az_deg == pytest.approx(AZ_DEG, abs=0.1)
 
 
+def test_what_is_learned_beside_another_model_begins_anew_and_beside_the_same_one_is_smoothed() -> None:
+    assert SKY.prediction is not None
+    beside_path = replace(status(), az_deg=AZ_DEG + 0.2)
+    seen = saw(beside_path)
+    assert seen.reading is not None
+    measured = offset_of(SKY.prediction, seen.reading.tai_s, seen.reading.az_deg, seen.reading.el_deg)
+    offsets = []
+    for model in (Model.ELEMENTS, Model.LAST_PASS):
+        sky = Sky(replace(SKY.prediction, model=model), None, PLAN)
+        state, _ = tick(learned(), TickInput(seen, sky, NOW), CONFIG)
+        assert state.signal.offset is not None
+        assert state.signal.offset.model is model
+        offsets.append((state.signal.offset.along_s, state.signal.offset.across_deg))
+    assert measured is not None
+    same, other = offsets
+    assert other == pytest.approx(measured)
+    assert same == pytest.approx((2.0 + 0.6 * (measured[0] - 2.0), 0.3 + 0.6 * (measured[1] - 0.3)))
+
+
 def test_without_any_fit_what_was_learned_holds_the_path_through_the_pass() -> None:
     """The fit process never answers; the satellite is 3 s late: 0.2 deg of azimuth now, 3 deg a minute later."""
     flight = flight_of(

@@ -6,10 +6,12 @@ from collections.abc import Awaitable, Callable
 import pytest
 from fake_sky import AZIMUTH, ELEVATION, START_TAI_S, Star
 
-from acu_daemon.acu.commands import AcuMode, PointAndPoll, PointAt, Poll, SelectMode, Stop
+from acu_daemon.acu.commands import AcuMode, PointAndPoll, PointAt, Poll, ReadCommanded, SelectMode, Stop
 from acu_daemon.acu.replies import AcuStatus, Done, Refused
 from acu_daemon.daemon.port import FIRST_POLL_S, AcuPort
 from acu_daemon.daemon.stopping import DEADLINE_S, stop_antenna
+from acu_daemon.drivers.sa3842.codec import CommandDecoder, encode_reply
+from acu_daemon.drivers.sa3842.messages import RegisterContents, Status, WriteAndPoll
 from acu_daemon.drivers.sa3842.sa3842_driver import SA3842, Sa3842Driver
 from acu_daemon.edge.clock import LoopClock
 from acu_daemon.errors import LinkError
@@ -330,3 +332,16 @@ def test_a_safe_stop_outlives_a_link_that_breaks_in_the_middle_of_it() -> None:
         assert port.connect_count == 2
 
     play(story)
+
+
+def test_every_write_of_the_cycle_gives_the_tilt_back_as_it_was_read_last() -> None:
+    driver = Sa3842Driver()
+    for tilt_code in (0, 1, 0x7FFF, 0x8000, 0xFFFF, 0x1234):
+        driver.begin(ReadCommanded(), 0.0)
+        assert driver.receive(encode_reply(0x33, RegisterContents(10.0, 20.0, tilt_code, 7)), 0.01) is not None
+        for _ in range(2):
+            events = CommandDecoder().feed(driver.begin(PointAndPoll(30.0, 40.0), 1.0), 1.0)
+            assert [event.command.tilt_code for event in events if isinstance(event.command, WriteAndPoll)] == [
+                tilt_code
+            ]
+            assert driver.receive(encode_reply(0x41, Status(30.0, 40.0, AcuMode.STANDBY)), 1.01) is not None

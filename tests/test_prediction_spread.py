@@ -8,9 +8,9 @@ from acu_daemon.assist.estimators.full.estimated_states import ORBIT, correction
 from acu_daemon.assist.mount_model import encoder_look
 from acu_daemon.assist.session.prediction import predict
 from acu_daemon.assist.session.prediction_spread import spread_of
-from acu_daemon.assist.settings import EstimatorSettings, StateSigmas
+from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings, StateSigmas
 from acu_daemon.control.tracking.track_frame import offset_of
-from acu_daemon.model import Correction, FitResult
+from acu_daemon.model import Correction, FitResult, Prediction
 
 T = RISING_TAI_S
 DRAW_COUNT = 300
@@ -51,3 +51,29 @@ def test_old_elements_spread_further_and_a_fit_without_a_covariance_says_nothing
     fit = FitResult("kalman", Correction(), T, 10, 0, 0.0, 0.0, 0.0)
     assert spread_of(source, site, fresh, fit, buffer, T) is None
     assert spread_of(source, site, fresh, None, buffer, T + 100.0) is None
+
+
+@pytest.mark.parametrize("at_s", [-150.0, -60.0, 0.0, 60.0, 120.0, 200.0])  # climbing, over the top, descending
+def test_a_satellite_of_which_only_the_time_is_in_doubt_is_spread_along_its_track_wherever_that_leads(
+    at_s: float,
+) -> None:
+    target = demo_target()
+    source, site = target.elements.propagator, target.station.site
+    one_deg = ElementSigmas(0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    settings = EstimatorSettings(orbit_sigmas=one_deg, **NO_BIAS)
+    buffer = predict(source, site, T + at_s - 30.0, T + at_s, "TLE", 168.0, horizon_s=60.0)
+    spread = spread_of(source, site, settings, None, buffer, T + at_s)
+    late = encoder_look(source.corrected(Correction(delta_mean_anomaly_rad=-1e-4)), np.array([T + at_s]), site, None)
+    off = offset_of(buffer, T + at_s, float(late.az_deg[0]), float(late.el_deg[0]))
+    assert spread is not None
+    assert off is not None
+    a_degree = np.radians(1.0) / 1e-4
+    assert spread[0] == pytest.approx(abs(off[0]) * a_degree, rel=0.1)
+    assert spread[1] < 0.3 * spread[0] * float(np.hypot(*_rates(buffer, T + at_s)))
+
+
+def _rates(buffer: Prediction, tai_s: float) -> tuple[float, float]:
+    """Degrees a second on the sky, right and up."""
+    at = buffer.at(tai_s)
+    assert at is not None
+    return at.az_rate_deg_s * float(np.cos(np.radians(at.el_deg))), at.el_rate_deg_s

@@ -27,7 +27,7 @@ from acu_daemon.acu.commands import (
 from acu_daemon.acu.replies import AcuIdentity, AcuStatus, Commanded, Done, Refused, Reply, TurnChoice, WatchdogTime
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.arming import last_command
-from acu_daemon.control.startup import after_reply, next_command
+from acu_daemon.control.startup import after_reply, next_command, watch_for_power_cycle
 from acu_daemon.control.state import ControlState, StartStage, Watchdog
 from acu_daemon.control.tick_input import Exchange
 from acu_daemon.drivers.sa3842.angles import LSB_DEG
@@ -324,3 +324,20 @@ def test_each_reply_to_each_question_at_each_stage_moves_the_start_by_what_the_t
         assert after.is_identity_sure is (is_identified and reply == SIMULATED), case
         is_present = (stage, asked, reply) == (StartStage.SECTOR_FREE, PointAt(10.0, 20.0), Done())
         assert after.present_deg == (10.0, 20.0) or not is_present, case
+
+
+@pytest.mark.parametrize("watchdog", Watchdog)
+@pytest.mark.parametrize("stage", StartStage)
+@pytest.mark.parametrize(("before", "now"), list(product(Backup, Backup)))
+def test_a_backup_that_changed_by_itself_has_all_registers_read_again_before_anything_is_written(
+    before: Backup, now: Backup, stage: StartStage, watchdog: Watchdog
+) -> None:
+    left = remembering(standing(), stage=stage, watchdog=watchdog)
+    left = remembering(left, status=status(backup_selected=before))
+    after = watch_for_power_cycle(left, status(backup_selected=now))
+    if stage is StartStage.READY and before is Backup.REMOTE and now is not Backup.REMOTE:
+        assert next_command(after, CONFIG) == ReadCommanded()
+        assert after.startup.watchdog is (Watchdog.UNKNOWN if watchdog is Watchdog.SET else watchdog)
+        assert after.startup.identity == left.startup.identity
+    else:
+        assert after == left

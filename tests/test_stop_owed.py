@@ -1,6 +1,7 @@
 """P1, P6: a STOP that is owed, and the end of the watchdog, are not lost by another word, a refusal or the end."""
 
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,8 @@ from test_tick import FITTED, NOW, SKY, saw, status
 from acu_daemon.acu.commands import READS, AcuMode, Command, SetWatchdog, Stop
 from acu_daemon.acu.replies import AcuStatus, Refused, Reply
 from acu_daemon.cli.virtual_pass import ScriptAccess as Rigged
-from acu_daemon.control.state import ControlState, StartStage, Watchdog
+from acu_daemon.control.safety.arming import begin_run
+from acu_daemon.control.state import ControlState, Held, StartStage, Watchdog
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Exchange, Observation, Request, TickInput
 from acu_daemon.drivers.sa3842.messages import ReadParameter, ReadRegisters
@@ -45,6 +47,26 @@ def test_p6_the_stop_of_a_latch_that_was_not_acknowledged_yet_outlives_what_a_pe
 def test_p1_disarmed_in_a_daemon_that_was_started_again_what_the_one_before_has_moved_is_stopped() -> None:
     assert asked(remembering(moving(), in_force=None), Request.DISARM).arming.is_stop_due
     assert not asked(remembering(moving(), in_force=None, held=None), Request.DISARM).arming.is_stop_due  # another's
+
+
+@pytest.mark.parametrize(
+    ("is_due", "is_held", "by_people"), list(product((True, False), (True, False), (True, False, None)))
+)
+@pytest.mark.parametrize("daemon", ["armed", "disarmed", "resting", "shadow"])
+def test_p1_a_run_owes_the_stop_that_was_left_owing_and_a_resting_one_that_of_whoever_held_the_antenna(
+    daemon: str, is_due: bool, is_held: bool, by_people: bool | None
+) -> None:
+    kinds = {"is_shadow": daemon == "shadow", "is_resting": daemon == "resting", "is_armed": daemon != "disarmed"}
+    config = replace(GUARDED, **kinds)
+    left = remembering(is_stop_due=is_due, held=Held() if is_held else None, by_people=by_people)
+    is_armed = daemon == "armed" if by_people is None else by_people and daemon in ("armed", "disarmed")
+    is_owed = {
+        "shadow": False,
+        "resting": is_held,  # it commands nothing in the passes to come before it was armed for them
+        "armed": is_due and (is_armed or is_held),
+        "disarmed": is_due and (is_armed or is_held),
+    }[daemon]
+    assert begin_run(left, config).arming.is_stop_due is is_owed
 
 
 @pytest.mark.parametrize("requests", [(Request.CLEAR,), (Request.DISARM, Request.CLEAR, Request.ARM)])

@@ -66,6 +66,15 @@ def test_a_wrong_lock_gives_way_after_three_times_its_length_sooner_or_later_by_
     assert needed <= after_s <= needed + EVERY_S
 
 
+@pytest.mark.parametrize(("wrong_s", "off", "rise_db", "needed"), [(32, EARLY, 0.0, MOST_S)])
+def test_a_wrong_lock_however_long_gives_way_after_75_s(
+    wrong_s: int, off: Correction, rise_db: float, needed: float
+) -> None:
+    after_s = gave_way_s(wrong_s, off, rise_db, int(needed + 3 * EVERY_S))
+    assert after_s is not None
+    assert needed <= after_s <= needed + EVERY_S
+
+
 @pytest.mark.parametrize(("rise_db", "needed"), [(None, LEAST_S), (0.0, 36.0), (-2.0, 36.0)])
 def test_a_wrong_lock_on_an_unlikely_orbit_gives_way_at_once_only_where_nobody_knows_the_level(
     rise_db: float | None, needed: float
