@@ -13,7 +13,7 @@ from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.intake import RATE_READINGS
 from acu_daemon.control.state import ControlState
-from acu_daemon.control.tracking.register_limiter import limit
+from acu_daemon.control.tracking.register_limiter import _reachable, limit
 from acu_daemon.model import AxisLimits, Pointing
 from acu_daemon.pointing.axis import AxisState
 from acu_daemon.pointing.envelope import Envelope
@@ -172,3 +172,31 @@ def test_p5_an_elevation_outside_its_limits_is_held_at_the_nearer_one_and_the_az
         assert passed.el.position_deg == pytest.approx(held_deg, abs=RATE_TOLERANCE_DEG)
         assert passed.az.position_deg == pytest.approx(100.2, abs=RATE_TOLERANCE_DEG)
         assert passed.limited.startswith("elevation outside 7 to 66 deg, held at")
+
+
+AXIS_AT = {"position_deg": st.floats(-60.0, 60.0), "rate_deg_s": st.floats(-20.0, 20.0)}
+
+
+@given(
+    st.builds(AxisState, **AXIS_AT),
+    st.builds(AxisState, **AXIS_AT),
+    st.floats(0.05, 0.3),
+    st.floats(0.5, 20.0),
+)
+def test_an_axis_comes_to_a_falling_path_as_it_comes_to_a_rising_one(start, wanted, dt_s, half_beam_deg) -> None:
+    def mirrored(axis: AxisState) -> AxisState:
+        return AxisState(-axis.position_deg, -axis.rate_deg_s)
+
+    limits = AxisLimits(-270.0, 270.0, 20.0, 10.0)
+    right = _reachable(start, wanted, dt_s, limits, half_beam_deg)
+    left = mirrored(_reachable(mirrored(start), mirrored(wanted), dt_s, limits, half_beam_deg))
+    assert (left.position_deg, left.rate_deg_s) == pytest.approx((right.position_deg, right.rate_deg_s), abs=1e-9)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_an_axis_behind_a_path_that_takes_nearly_all_of_its_drive_is_let_run_faster_than_the_path(sign: int) -> None:
+    limits = AxisLimits(-270.0, 270.0, 20.0, 10.0)
+    axis, path_deg = AxisState(0.0, sign * 18.0), 30.0
+    for k in range(100):
+        axis = _reachable(axis, AxisState(sign * (path_deg + 1.9 * k), sign * 19.0), 0.1, limits, 0.5)
+    assert sign * axis.rate_deg_s > 19.3
