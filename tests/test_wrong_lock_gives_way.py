@@ -1,5 +1,7 @@
 """How long a wrong lock is believed against the satellite's own readings: by its length, the levels, and the offset."""
 
+from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -7,9 +9,10 @@ import pytest
 from made_orbits import circular, site, visible
 from real_passes import noisy
 
-from acu_daemon.assist.session.refit import RefitRequest, RefitSetup, Refitter
+from acu_daemon.assist.estimators.full.carry_over import resume_of
+from acu_daemon.assist.session.refit import RefitReply, RefitRequest, RefitSetup, Refitter
 from acu_daemon.assist.settings import EstimatorSettings
-from acu_daemon.model import AxisLimits, Correction, Readings
+from acu_daemon.model import AxisLimits, Correction, Model, Readings, sky_angle_deg
 from acu_daemon.orbit.look import look_at
 
 AZIMUTH = AxisLimits(-270.0, 270.0, 20.0, 10.0)
@@ -82,3 +85,26 @@ def test_a_wrong_lock_on_an_unlikely_orbit_gives_way_at_once_only_where_nobody_k
     after_s = gave_way_s(12, UNLIKELY, rise_db, int(needed + 3 * EVERY_S))
     assert after_s is not None
     assert needed <= after_s <= needed + EVERY_S
+
+
+def test_a_wrong_lock_that_a_daemon_started_again_has_gone_on_from_goes_whole_when_it_gives_way() -> None:
+    tai_s = visible(SOURCE, WHERE, 1.0)[60:100]
+    wrong, own = look_at(SOURCE.corrected(UNLIKELY), tai_s, WHERE), look_at(SOURCE, tai_s, WHERE)
+    is_wrong = np.arange(tai_s.size) < 20
+    az_deg, el_deg = np.where(is_wrong, wrong.az_deg, own.az_deg), np.where(is_wrong, wrong.el_deg, own.el_deg)
+    readings = noisy(az_deg, el_deg, tai_s, 0.03, np.random.default_rng(4))
+    setup = RefitSetup(SOURCE, WHERE, "full", SETTINGS, AZIMUTH)
+
+    def replies(refitter: Refitter, first: int, last: int) -> Iterator[tuple[int, RefitReply]]:
+        for k in range(first, last):
+            now = float(tai_s[k])
+            yield k, refitter.refit(RefitRequest(readings.part(slice(k, k + 1)), now, 2.0, now, 180.0))
+
+    *_, (_, before) = replies(Refitter(setup), 0, 10)
+    assert before.fit is not None
+    resumed = Refitter(replace(setup, carried=resume_of(before.fit, SOURCE, WHERE)))
+    k, gave_way = next((k, reply) for k, reply in replies(resumed, 10, 40) if reply.gate.reset_count)
+    point = gave_way.prediction.at(float(tai_s[k]))
+    assert gave_way.model is Model.NEW_FIT  # of the new readings alone, at once
+    assert point is not None
+    assert sky_angle_deg(point.az_deg, point.el_deg, float(own.az_deg[k]), float(own.el_deg[k])) < 0.05
