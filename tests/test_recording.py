@@ -258,6 +258,24 @@ def told(*seconds: float, path: Path, whose: Whose, now_tai_s: float = FAR_S) ->
     return "; ".join(str(log["reason"]) for log in logs if log["event"] == "record.beside")
 
 
+@pytest.mark.parametrize(
+    ("change", "goes_on"),
+    [
+        ({"height_m": CUIABA.height_m + 19.0}, True),
+        ({"height_m": CUIABA.height_m + 21.0}, False),
+        ({"height_m": CUIABA.height_m - 21.0}, False),
+        ({"latitude_deg": CUIABA.latitude_deg + 0.9e-4}, True),
+        ({"latitude_deg": CUIABA.latitude_deg - 1.1e-4}, False),
+        ({"longitude_deg": CUIABA.longitude_deg - 0.9e-4}, True),
+        ({"longitude_deg": CUIABA.longitude_deg + 1.1e-4}, False),
+        ({"longitude_deg": CUIABA.longitude_deg + 360.0}, True),
+        ({"name": "the other mast"}, False),
+    ],
+)
+def test_readings_of_two_stations_stand_in_one_file_only_where_both_are_one_place(change, goes_on: bool) -> None:
+    assert SCD.may_go_on(replace(SCD, station=replace(CUIABA, **change))) is goes_on
+
+
 def test_a_recording_says_beside_it_whose_it_is_and_is_gone_on_with(tmp_path: Path) -> None:
     path = tmp_path / "x.csv"
     assert told(100.0, path=path, whose=SCD) == ""
