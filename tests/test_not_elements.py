@@ -187,7 +187,7 @@ ISS
     (tmp_path / "station.toml").write_text(STATION.replace("-15.53", "32.5").replace("-56.07", "-85.5"))
     asked = ("passes", "--config", directory, "--from", "2024-03-09T18:00:00Z")
     done = acu_daemon(*asked)
-    assert "2024-03-09 18:23:21" in done.out
+    assert "2024-03-09 18:23:19" in done.out
     assert "of 2 sets the one of 2024-03-09T19:12:00Z is used, 1.2 h after 2024-03-09T18:00:00Z: nearest in" in done.err
     checked = acu_daemon("check", "--config", directory, "--at", "2024-03-09T18:00:00Z")
     assert "GO     sat: elements          epoch 2024-03-09T19:12:00Z" in checked.out
@@ -279,7 +279,7 @@ def geo(directory: Path, longitude_deg: float, latitude_deg: float = 32.5) -> Pa
 def test_a_satellite_that_never_sets_is_said_to_in_words(tmp_path: Path) -> None:
     directory = geo(tmp_path, -85.5)
     [_, line] = passes(directory).out.splitlines()
-    assert line.endswith("always up: does not set")
+    assert "  always up: does not set" in line
     [one] = json.loads(passes(directory, "--json").out)
     assert (one["does_not_rise"], one["does_not_set"]) == (True, True)
     checked = acu_daemon("check", "--config", directory, "--at", "2024-03-09T12:00:00Z")
@@ -308,7 +308,7 @@ def test_a_satellite_that_never_rises_is_said_to_in_words(tmp_path: Path) -> Non
         ("garb", "2025-03-03T03:00:00Z", 2, "decayed"),
         ("dec", "2018-11-03T05:00:00Z", 0, "sat  "),
         ("many", "2024-03-01T12:00:00Z", 0, "noaa19 is left out"),
-        ("near", "2024-03-09T18:00:00Z", 0, "2024-03-09 18:23:21"),
+        ("near", "2024-03-09T18:00:00Z", 0, "2024-03-09 18:23:19"),
         ("pathf", "2025-01-03T12:00:00Z", 0, "sat  "),
         ("amsat2", "2024-03-09T12:00:00Z", 2, "checksum"),
         ("web", "2024-03-09T12:00:00Z", 2, "a notice"),
