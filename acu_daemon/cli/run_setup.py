@@ -24,9 +24,13 @@ from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.link import Link
 from acu_daemon.edge.scheduling import scheduling_text
 from acu_daemon.edge.writer import Writer
+from acu_daemon.errors import OrbitError
 from acu_daemon.model import Pass
+from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.units import DAY_S
+
+SHOWN_COUNT = 3  # of the passes to come
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +87,26 @@ def prepare(frame: RunSetup, target: Target, memory: ControlState | None = None)
     )
     job = replace(job, control=replace(job.control, is_shadow=frame.is_shadow))
     job = replace(job, state=kept.state if memory is None else memory, is_anew=memory is not None)
+    job = replace(job, next_passes=next_passes(target, coming))
     return Prepared(target, coming, job, kept)
+
+
+def next_passes(target: Target, coming: Pass) -> tuple[str, ...]:
+    """The passes after this one within a day, in words."""
+    begin_tai_s = coming.set_tai_s + 1.0
+    lowest_deg, name = target.station.station.min_elevation_deg, target.satellite.satellite.name
+    try:
+        found = find_passes(
+            target.elements.propagator, target.station.site, begin_tai_s, begin_tai_s + DAY_S, lowest_deg
+        )
+    except OrbitError:  # the elements do not know so far ahead
+        return ()
+    return tuple(next_text(name, one.rise_tai_s, one.culmination_el_deg) for one in found[:SHOWN_COUNT])
+
+
+def next_text(satellite: str, rise_tai_s: float, culmination_el_deg: float) -> str:
+    """A pass to come, for people."""
+    return f"{satellite} {utc_text(rise_tai_s, 0)[11:16]} {culmination_el_deg:.0f} deg"
 
 
 def make_job(

@@ -238,7 +238,9 @@ class StationRuns:
         )
         control = replace(job.control, is_shadow=setup.is_shadow, is_resting=is_resting)
         state = job.state if self._memory is None else self._memory
-        return replace(job, control=control, state=state, is_anew=self._memory is not None)
+        after_tai_s = setup.clock.tai_s() if coming is None else coming.rise_tai_s + 60.0
+        shown = self.day.next_passes(after_tai_s)
+        return replace(job, control=control, state=state, is_anew=self._memory is not None, next_passes=shown)
 
     async def _serve(self, job: PassJob, runner: FitRunner, why_anew: Callable[[bool, float], str] | None) -> Outcome:
         if self._kept is None:  # what people and the antenna have told before this process

@@ -20,6 +20,7 @@ from acu_daemon.cli.check import findings
 from acu_daemon.cli.check_finding import NO_GO
 from acu_daemon.cli.elements_watch import keep_confirmed
 from acu_daemon.cli.options import Target, coming_pass, load_target, longest_lead
+from acu_daemon.cli.run_setup import SHOWN_COUNT, next_text
 from acu_daemon.cli.schedule_plan import StationPlan, station_plan
 from acu_daemon.config.load import load_station
 from acu_daemon.config.station_tables import StationFile
@@ -228,6 +229,11 @@ class StationDay:
             if is_open and (one.start_tai_s or 0.0) >= self._words.pause_until_tai_s:
                 return one
         return None
+
+    def next_passes(self, after_tai_s: float) -> tuple[str, ...]:
+        """The granted passes that begin after a time, in words."""
+        later = [one for one in self._book if one.state is PassState.PLANNED and one.rise_tai_s > after_tai_s]
+        return tuple(next_text(one.satellite, one.rise_tai_s, one.culmination_el_deg) for one in later[:SHOWN_COUNT])
 
     def _due(self, now_tai_s: float) -> str:
         entry = self.coming()

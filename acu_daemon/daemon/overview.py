@@ -42,6 +42,7 @@ def status_rows(seen: Snapshot) -> list[tuple[str, str]]:
         ("buffer", _buffer(seen)),
         ("sun", _sun(seen)),
         ("control", _control(seen)),
+        ("next", "; ".join(seen.next_passes)),
         ("ACU", ", ".join(text for text in (seen.acu, seen.acu_mode if seen.is_link_up else "no link") if text)),
         ("late ticks", f"{seen.skipped_tick_count} of {seen.tick_count + seen.skipped_tick_count} skipped"),
     )

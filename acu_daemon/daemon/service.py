@@ -57,6 +57,7 @@ class PassJob:
     satellite: str = ""  # names for people
     station: str = ""
     elements: str = ""  # kind and epoch, for people
+    next_passes: tuple[str, ...] = ()  # after this one, for people
     move: PassPlan | None = None  # only go there, before a pass or after it
     is_anew: bool = False  # not the first run of this daemon: the ACU was there
 
@@ -324,6 +325,7 @@ class Service:
                 self._job.coming,
                 self._job.elements,
                 self._elements_problem(),
+                self._job.next_passes,
             ),
             is_rehearsal=self._job.is_rehearsal,
             files_alarm=self._files_alarm(),

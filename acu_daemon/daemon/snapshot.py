@@ -20,6 +20,7 @@ class Subject:
     coming: Pass | None = None
     elements: str = ""
     elements_problem: str = ""
+    next_passes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +96,7 @@ class Snapshot:
     rise_in_s: float | None = None  # negative: the pass has begun
     set_in_s: float | None = None
     culmination_deg: float | None = None
+    next_passes: tuple[str, ...] = ()  # after this one: satellite, rise, highest elevation, for people
     zenith: str = ""  # what crossing it is expected to cost, until it is past
     sun_deg: float | None = None  # between boresight and sun; None where sun_policy is off
     sun_reach_s: float | None = None  # until the sun's keep-out is where the antenna stands; None: not within an hour

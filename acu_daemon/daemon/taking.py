@@ -56,6 +56,7 @@ def take_snapshot(
         acu=subject.acu,
         elements=subject.elements,
         elements_problem=subject.elements_problem,
+        next_passes=subject.next_passes,
         state_s=now_tai_s - state.tracking.entered_tai_s if isfinite(state.tracking.entered_tai_s) else None,
         half_beam_deg=half_beam_deg,
         off_path_deg=off.off_deg if off else None,
