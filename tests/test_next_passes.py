@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 from command_line import acu_daemon
 from flights import SCD_HIGH_TAI_S, climb, scd_target, the_pass
@@ -10,15 +11,15 @@ from acu_daemon.cli.run_setup import SHOWN_COUNT, next_passes
 from acu_daemon.daemon.overview import status_rows
 from acu_daemon.orbit.timescales import tai_from_utc, utc_text
 
+CONFIG = Path(__file__).resolve().parents[1] / "config"
+
 
 def test_the_next_three_passes_are_those_of_the_passes_command() -> None:
     target = scd_target(SCD_HIGH_TAI_S)
     coming = the_pass(target, SCD_HIGH_TAI_S)
     said = next_passes(target, coming)
     start = utc_text(coming.set_tai_s + 60.0)
-    listed = json.loads(
-        acu_daemon("passes", "--config", "config", "--satellite", "scd-1", "--from", start, "--json").out
-    )
+    listed = json.loads(acu_daemon("passes", "--config", CONFIG, "--satellite", "scd-1", "--from", start, "--json").out)
     assert said == tuple(
         f"SCD-1 {utc_text_of(one['rise_utc'])} {one['culmination_el_deg']:.0f} deg" for one in listed[:SHOWN_COUNT]
     )
