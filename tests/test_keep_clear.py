@@ -11,6 +11,7 @@ from troubled_decision import TroubledDecision
 
 from acu_daemon.acu.commands import PointAndPoll, PointAt
 from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.tracking.keep_clear import Led, braking, is_far, led_clear
 from acu_daemon.control.tracking.register_limiter import limit
 from acu_daemon.model import AxisLimits, Pointing, Site, Station, sky_angle_deg
 from acu_daemon.pointing.axis import AxisState
@@ -165,3 +166,29 @@ def test_a_whole_decision_in_troubles_writes_nothing_inside_and_leads_an_antenna
                 antenna_deg = envelope.clearance_deg(state.intake.az_deg, status.el_deg, now_tai_s)
                 clear_deg = envelope.clearance_deg(command.az_deg, command.el_deg, now_tai_s)
                 assert clear_deg >= 0.0 or antenna_deg < 0.1
+
+
+@pytest.mark.parametrize("most_deg", [90.0, 180.0])
+def test_where_zones_are_far_the_whole_of_the_way_and_the_brake_are_clear_of_them(most_deg: float) -> None:
+    """What is skipped there would have changed nothing: neither what is wanted nor the step."""
+    elevation = AxisLimits(0.0, most_deg, 5.0, 5.0)
+    box = KeepOut("mast", 100.0, 130.0, 10.0, 60.0)
+    envelope, random, far_count = Envelope(AZIMUTH, elevation, (box,), SUN), Random(7), 0
+    for _ in range(4000):
+        az = AxisState(random.uniform(-270.0, 270.0), random.uniform(-20.0, 20.0))
+        el = AxisState(random.uniform(0.0, most_deg), random.uniform(-5.0, 5.0))
+        wanted = Pointing(az.position_deg + random.gauss(0.0, 5.0), el.position_deg + random.gauss(0.0, 3.0), 1.0, 1.0)
+        if not is_far(wanted, az, el, STEP_S, MORNING, envelope):
+            continue
+        far_count += 1
+        led = led_clear(wanted, az, el, MORNING, envelope, is_followed=True)
+        assert led == Led(wanted)
+        step = tuple(
+            AxisState(axis.position_deg + (axis.rate_deg_s + rate) * STEP_S / 2.0, rate)
+            for axis, rate in (
+                (az, az.rate_deg_s + random.uniform(-10.0, 10.0) * STEP_S),
+                (el, el.rate_deg_s + random.uniform(-5.0, 5.0) * STEP_S),
+            )
+        )
+        assert braking((az, el), step, STEP_S, MORNING, envelope) == step
+    assert far_count > 500

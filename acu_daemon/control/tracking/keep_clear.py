@@ -17,6 +17,7 @@ from acu_daemon.pointing.way_round import LEAST_CLEAR_DEG, moved_out, next_aim
 
 BRAKE_SHARE = 0.9  # of the drive's acceleration
 AROUND_SHARE = 0.3  # of the drive's rate, on a way around a zone: the antenna shall not cut its corners
+FAR_DEG = 1.0  # beyond the way, for LEAST_CLEAR_DEG and a mount that is not square
 LEAST_STEP_DEG, MOST_LOOKS = 0.05, 200  # of the looks along a brake
 LED_AROUND = "led around a keep-out"
 IN_THE_WAY = "a keep-out is in the way, and none leads around it"
@@ -29,6 +30,18 @@ class Led:
     wanted: Pointing
     told: str = ""
     is_around: bool = False  # on a way around a zone
+
+
+def is_far(wanted: Pointing, az: AxisState, el: AxisState, dt_s: float, now_tai_s: float, envelope: Envelope) -> bool:
+    """Whether zones are so far that neither what is wanted, nor the way, nor a brake after a step comes near one.
+
+    On the sky nothing is farther than the sum of both axes' ways: then the rest of this module has nothing to say.
+    """
+    way_deg = abs(wanted.az_deg - az.position_deg) + abs(wanted.el_deg - el.position_deg)
+    for axis, limits in ((az, envelope.azimuth), (el, envelope.elevation)):
+        speed = abs(axis.rate_deg_s) + limits.max_acceleration_deg_s2 * dt_s
+        way_deg += speed * (dt_s + speed / (2.0 * BRAKE_SHARE * limits.max_acceleration_deg_s2))
+    return envelope.clearance_deg(az.position_deg, el.position_deg, now_tai_s) > way_deg + FAR_DEG
 
 
 def led_clear(

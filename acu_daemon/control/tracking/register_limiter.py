@@ -12,7 +12,7 @@ from math import copysign, cos, isfinite, radians
 from acu_daemon.acu.angle_steps import clamp_to_step
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState
-from acu_daemon.control.tracking.keep_clear import AROUND_SHARE, braking, led_clear
+from acu_daemon.control.tracking.keep_clear import AROUND_SHARE, braking, is_far, led_clear
 from acu_daemon.model import AxisLimits, Pointing
 from acu_daemon.pointing.axis import AxisState, step
 from acu_daemon.pointing.wrap import nearest_end_deg
@@ -55,7 +55,8 @@ def limit(
             _legal(az, config.azimuth, step_deg), _legal(el, config.elevation, step_deg), True, "not a finite angle"
         )
     wanted, limited = within_limits(wanted, az.position_deg, config)
-    azimuth, elevation, has_zones = config.azimuth, config.elevation, config.envelope.has_zones
+    azimuth, elevation = config.azimuth, config.elevation
+    has_zones = config.envelope.has_zones and not is_far(wanted, az, el, dt_s, now_tai_s, config.envelope)
     if has_zones:
         led = led_clear(wanted, az, el, now_tai_s, config.envelope, is_followed=is_followed)
         wanted, limited = led.wanted, limited or led.told
