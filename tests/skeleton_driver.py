@@ -6,6 +6,7 @@
            who                     who NAME
 
 One answer to each line, in order.  Copy it, and put your ACU's bytes in the places of `_line` and `_reply`.
+One with autotrack, a backup and bearings: tagged_driver.py.
 """
 
 from math import isfinite
@@ -54,7 +55,7 @@ class SkeletonDriver:
             case Poll():
                 return "status"
             case PointAt(az_deg, el_deg):
-                return f"point {az_deg:.2f} {el_deg:.2f}"
+                return f"point {az_deg:.2f} {el_deg:.2f}"  # a bearing: round(az_deg, 2) % 360.0, so that none is 360.00
             case SelectMode(AcuMode.REMOTE):
                 return "remote"
             case Stop() | SelectMode(AcuMode.STANDBY):
@@ -82,7 +83,7 @@ class SkeletonDriver:
     # What is every such ACU's
 
     def timing(self, byte_time_s: float) -> Timing:
-        return Timing(0.010, 0.010, 0.010)
+        return Timing(0.010, 0.010, 0.010)  # of your ACU; or `[acu] device_delay_s`, by DriverSettings
 
     def wire_bytes(self, command: Command) -> int:
         return 0

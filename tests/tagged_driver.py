@@ -77,7 +77,7 @@ class TaggedDriver:
             case Poll() | Identify():
                 words = "status" if command == Poll() else "name"
             case PointAt(az_deg, el_deg) | PointAndPoll(az_deg, el_deg):
-                words = f"goto {az_deg % 360.0:.3f} {el_deg:.3f}"
+                words = f"goto {round(az_deg, 3) % 360.0:.3f} {el_deg:.3f}"
             case Stop() | SelectMode(AcuMode.STANDBY):
                 words = "mode halt"
             case SelectMode(AcuMode.REMOTE):

@@ -132,7 +132,7 @@ STATION_MISTAKES = [
         "acu.dead_band_deg = 0.6: expected at most half of safety.following_error_deg",
     ),
     ("[acu]", '[receiver]\nsignal = "acu"\n[acu]\ndialect = "rotctl"', 'receiver.signal = "acu": an ACU with dialect'),
-    ("[acu]", '[acu]\ndialect = "x"', "acu.dialect = \"x\": expected 'sa3842' or 'rotctl'"),
+    ("[acu]", '[acu]\ndialect = "x"', "acu.dialect = \"x\": expected 'sa3842'"),
     ("[acu]", "[acu]\naddress = 12", "acu.address = 12: '12' is not an ACU address, expected one character"),
     ("tcp://127.0.0.1:3842", "tcp://127.0.0.1", 'acu.url = "tcp://127.0.0.1": link'),
     ("tcp://127.0.0.1:3842", "com1", "acu.url = \"com1\": link 'com1' is not understood; expected tcp://HOST:PORT"),

@@ -47,7 +47,7 @@ from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.drivers.dialects import DIALECTS
 from acu_daemon.units import wrap_180
 
-THERE = PointAt(32.0, 42.0)  # a little beside where every bench begins
+THERE = PointAt(32.37, 42.26)  # a little beside where every bench begins, azimuth 30, elevation 40
 STEP_S = 0.1
 SETTLED_S = 5.0
 PROMISED: list[tuple[Command, type[Reply], str]] = [  # the reply, and the capability that promises it
@@ -106,7 +106,8 @@ class Table:
 
 
 def test_every_dialect_has_its_bench() -> None:
-    assert set(DIALECTS) <= {bench.name for bench in BENCHES}
+    without = set(DIALECTS) - {bench.name for bench in BENCHES}
+    assert not without, "a line of its own in driver_benches.BENCHES, named as the dialect"
 
 
 @benches
@@ -153,6 +154,19 @@ def test_the_same_questions_are_the_same_bytes(bench: Bench) -> None:
                 table.ask(command)
         sent.append(table.sent)
     assert sent[0] == sent[1]
+
+
+@benches
+def test_an_acu_that_takes_bearings_is_sent_one_whatever_the_turn(bench: Bench) -> None:
+    can = bench.driver().capabilities
+    if can.is_azimuth_continuous:
+        return
+
+    def sent(az_deg: float) -> bytes:
+        return bench.driver().begin(PointAt(az_deg, 42.0), 0.0)
+
+    assert sent(392.0) == sent(-328.0) == sent(32.0), "modulo 360"
+    assert sent(-0.2 * can.angle_step_deg) == sent(360.0) == sent(0.0), "rounded first, then modulo: 0, never 360"
 
 
 @benches
@@ -210,7 +224,7 @@ def test_with_autotrack_it_takes_the_signal_and_goes_by_command_when_it_is_lost(
     table.ask(SelectMode(AcuMode.AUTOTRACK))
     status = table.status()
     assert (status.mode, status.is_autotrack_selected, status.is_acquired) == (AcuMode.ACQUIRE, True, False)
-    assert status.follows_registers
+    assert status.follows_registers, "backup_selected is REMOTE, of an ACU with no other backup always"
     for _ in range(2):
         table.acu.hears(True)
         table.lead(PointAt(30.0, 40.0), 3.0)
@@ -269,10 +283,11 @@ def test_noise_is_no_reply_and_raises_nothing_and_the_next_connection_is_clean(
 
 @benches
 def test_who_it_is_is_said_and_whether_it_is_simulated(bench: Bench) -> None:
-    identity = Table(bench).ask(Identify())
+    table = Table(bench)
+    identity = table.ask(Identify())
     assert isinstance(identity, AcuIdentity)
     assert identity.is_known
-    assert identity.is_simulated
+    assert identity.is_simulated is bool(table.sent[0]), "the bench says that it is; who is not asked cannot"
     assert identity.text
 
 

@@ -16,8 +16,6 @@ class Capabilities:
     has_turn_choice: bool = True  # a parameter decides on which of two turns a bearing is followed
     has_register_watchdog: bool = True  # it stops the antenna when no angles are commanded for a while
     has_read_back: bool = True  # the commanded angles can be read
-    has_identity: bool = True
-    has_tilt: bool = False  # a third axis, left as it is
     has_combined_write: bool = True  # angles are commanded and the status asked in one exchange
     is_azimuth_continuous: bool = False  # it counts the turns of the cable; else it shows a bearing
     angle_step_deg: float = 360.0 / 2**16  # of angles that are commanded, and of those that are read at best

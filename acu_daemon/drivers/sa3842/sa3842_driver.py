@@ -37,7 +37,7 @@ LONGEST_EXTRA = 18  # bytes of the longest housekeeping exchange that goes besid
 HALF_SERVO_TICK_S = 0.010  # a command waits for half a 50 Hz servo tick on average: docs/protocol.md, Servo
 EMERGENCY_STOP, DOOR_OPEN = 1, 2  # of the interlock nibble: docs/protocol.md, Fault detail
 WATCHDOG_TRIPPED = 2  # of the system nibble
-SA3842 = Capabilities(has_tilt=True, angle_step_deg=LSB_DEG, watchdog_step_s=WATCHDOG_LSB_S)
+SA3842 = Capabilities(angle_step_deg=LSB_DEG, watchdog_step_s=WATCHDOG_LSB_S)
 
 
 class Sa3842Driver:
