@@ -163,7 +163,7 @@ def command(
             return
         base = state_directory(state, is_rehearsal=clock.is_rehearsal)
         antenna = antenna_of(load_station(config))
-        directory = antenna_directory(base, antenna)
+        directory = antenna.folder(base)
         older = () if clock.is_rehearsal else older_folders(base, antenna)  # nothing is carried between rehearsals
         if satellite is None:
             target = first_usable(config, clock.tai_s())
@@ -173,6 +173,7 @@ def command(
         _tell_clock(met if clock.is_rehearsal else met_by_chance(url, clock), clock)
         link = make_link(url)
         check_rate(link, driver_of(target.station), target.station.acu.period_s, target.station.acu.device_delay_s)
+        directory = antenna_directory(base, antenna)
         if satellite is None:
             if record is not None:
                 raise UsageError("--record needs --satellite: of a station with many, a file belongs to one pass")

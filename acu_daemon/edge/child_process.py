@@ -6,6 +6,8 @@ import os
 import sys
 from typing import Any
 
+NOTED_S = 0.005
+
 
 async def start_python(module: str, *arguments: str, **pipes: Any) -> asyncio.subprocess.Process:
     """Run a module of this package in a process of its own, with the same places to load from and no others.
@@ -24,6 +26,23 @@ async def start(*command: str, **pipes: Any) -> asyncio.subprocess.Process:
         return await asyncio.create_subprocess_exec(*command, **pipes)
     except RuntimeError as error:  # no thread for its watcher
         raise OSError(f"{error}") from None
+
+
+async def exited(process: asyncio.subprocess.Process) -> int:
+    """Wait for the end of a process alone; its own `wait` waits for every grandchild that keeps a pipe open as well."""
+    loop = asyncio.get_running_loop()
+    with contextlib.suppress(ProcessLookupError):  # it has ended and was taken note of
+        fd, ended = os.pidfd_open(process.pid), asyncio.Event()
+        loop.add_reader(fd, ended.set)
+        try:
+            if process.returncode is None:
+                await ended.wait()
+        finally:
+            loop.remove_reader(fd)
+            os.close(fd)
+    while process.returncode is None:  # noqa: ASYNC110  the child watcher hears of it in the same turn of the loop
+        await asyncio.sleep(NOTED_S)
+    return process.returncode
 
 
 def release(process: asyncio.subprocess.Process) -> None:

@@ -17,7 +17,7 @@ from typing import Any
 
 import structlog
 
-from acu_daemon.edge.child_process import release, start
+from acu_daemon.edge.child_process import exited, release, start
 
 KEPT_BYTES = 2000  # of what a hook prints
 MOST_BYTES = 65536  # it may print; then nobody reads on
@@ -152,7 +152,7 @@ async def _ended(process: asyncio.subprocess.Process, limit_s: float | None) -> 
     """Wait for a hook; its status, and what went wrong."""
     try:
         async with asyncio.timeout(limit_s):
-            status = await process.wait()
+            status = await exited(process)
     except TimeoutError:
         return await _killed(process), f"killed after {limit_s:g} s"
     except asyncio.CancelledError:  # the end of the pass, or of the daemon
@@ -194,5 +194,5 @@ async def _killed(process: asyncio.subprocess.Process) -> int:
             os.killpg(process.pid, number)
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(GRACE_S):
-                return await process.wait()
-    return await process.wait()
+                return await exited(process)
+    return await exited(process)
