@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from flights import count, demo_target, events_named, flight_of, worst_error_deg
+from flights import changed, count, demo_target, events_named, flight_of, worst_error_deg
 from memories import remembering
 
 from acu_daemon.acu.commands import AcuMode
@@ -16,7 +16,7 @@ from acu_daemon.config.to_settings import control_config, driver_of
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState
 from acu_daemon.daemon.envelope_watch import look_around
-from acu_daemon.drivers.sa3842.messages import SelectMode
+from acu_daemon.drivers.sa3842.messages import SelectMode, WriteAndPoll, WriteRegisters
 from acu_daemon.model import AxisLimits, sky_angle_deg
 from acu_daemon.orbit.look import apparent_at
 from acu_daemon.orbit.sun import sun_direction_deg
@@ -179,3 +179,46 @@ def test_a_stow_whose_way_leads_through_the_sun_is_an_alarm() -> None:
     assert seen.alarm == "the straight way to the stow position leads through the keep-out of the sun"
     clear = replace(envelope, stow_deg=(az_deg - 30.0, 80.0))
     assert look_around(stowing, STANDS_TAI_S + 1200.0, replace(config, envelope=clear)).alarm == ""
+
+
+def moved_deg(flight: Flight, from_tai_s: float) -> float:
+    rows = [row for row in flight.rows if row.tai_s >= from_tai_s]
+    return max(
+        max(abs(row.encoder_az_deg - rows[0].encoder_az_deg), abs(row.encoder_el_deg - rows[0].encoder_el_deg))
+        for row in rows
+    )
+
+
+@pytest.mark.parametrize("held", [{"is_shadow": True}, {"is_resting": True}, {"arm": "manual"}])
+def test_an_antenna_in_the_suns_keep_out_that_may_not_be_commanded_does_not_move_and_it_is_shown(held: dict) -> None:
+    chosen = target("avoid")
+    if "arm" in held:
+        chosen = changed(chosen, safety=dict(held))
+    az_deg, el_deg = (float(one[0]) for one in sun_direction_deg(np.array([STANDS_TAI_S]), chosen.station.site))
+    antenna = AcuChoice(azimuth_deg=az_deg, elevation_deg=el_deg)
+    flight = flight_of(chosen, STANDS_TAI_S, 15.0, antenna=antenna, **({} if "arm" in held else held))
+    assert moved_deg(flight, STANDS_TAI_S) < 0.001
+    assert count(flight, (SelectMode, WriteAndPoll, WriteRegisters)) == 0
+    last = flight.snapshots[-1]
+    assert last.sun_deg == pytest.approx(0.0, abs=0.3)
+    assert last.sun_reach_s == 0.0
+    assert last.way_out_az_deg is not None
+
+
+def test_an_antenna_that_latches_on_its_way_to_the_sun_stands_and_it_is_shown_how_long_until_the_keep_out() -> None:
+    chosen = target("avoid")
+    look = apparent_at(chosen.elements.propagator, np.array([BEGIN_TAI_S]), chosen.station.site)
+    antenna = AcuChoice(azimuth_deg=float(look.az_deg[0]), elevation_deg=float(look.el_deg[0]))
+    flight = flight_of(
+        chosen,
+        BEGIN_TAI_S,
+        25.0,
+        antenna=antenna,
+        losses=[(2.0, 25.0)],
+        faults=["stuck axis=elevation start_s=5 duration_s=3600"],
+    )
+    latched = next(seen.tai_s for seen in flight.snapshots if seen.latch)
+    assert moved_deg(flight, latched + 3.0) < 0.01
+    after = [one for tai_s, one in flight.commands if tai_s > latched + 1.0]
+    assert not [one for one in after if isinstance(one, SelectMode | WriteAndPoll | WriteRegisters)]
+    assert flight.snapshots[-1].sun_deg == pytest.approx(from_the_sun_deg(flight)[-1], abs=0.3)
