@@ -1,6 +1,7 @@
 """The station: passes of several satellites one after the other, by the schedule, in virtual time."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,7 @@ from config_files import BROUWER, STATION, replaced, write
 
 from acu_daemon.acu.commands import AcuMode
 from acu_daemon.cli.virtual_station import Days, KilledError, StationAccess, run_days
+from acu_daemon.edge.hooks import Hook
 from acu_daemon.edge.schedule_file import ScheduleFile
 from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.schedule.book import Entry, PassState
@@ -20,6 +22,7 @@ HIGH = (
 )
 BEHIND = replaced(BROUWER, "SCD-1", "SCD-9").replace("mean_anomaly_deg = 350.56", "mean_anomaly_deg = 346.0")
 START = tai_from_utc("1989-02-01T02:03:00Z")
+STANDBY = AcuMode.STANDBY
 FIRST = "[schedule]\npriority = 7\nmin_useful_s = 30\n"
 SHORT = "[schedule]\nmin_useful_s = 30\n"
 
@@ -46,12 +49,35 @@ def night(tmp_path: Path, station: str = "", minutes: float = 13.0, **more: obje
         return Night(days, file.book(START))
 
 
+HORN_S = 7.0
+HORN = f'[hooks]\nbefore_move = ["horn"]\nbefore_move_s = {HORN_S}\n'
 PARK = '[schedule]\nafter = "park"\npark_az_deg = 20.0\npark_el_deg = 60.0\nnext_within_s = 60\n'
 
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory: pytest.TempPathFactory) -> Night:
-    return night(tmp_path_factory.mktemp("plain"), PARK, minutes=7.0)
+    return night(tmp_path_factory.mktemp("plain"), PARK + HORN, minutes=7.0, script=[(START, hear_the_horn)])
+
+
+HEARD_TAI_S: list[float] = []
+
+
+def hear_the_horn(access: StationAccess) -> None:
+    """No program is started in virtual time: when it would be is noted."""
+
+    def called(hook: Hook, _about: object) -> None:
+        if hook is Hook.BEFORE_MOVE:
+            HEARD_TAI_S.append(access.runs._setup.clock.tai_s())
+
+    access.runs.day.hooks.call = called  # type: ignore[method-assign]
+
+
+def test_the_horn_is_heard_before_each_unasked_move_and_the_antenna_is_watched_meanwhile(plain: Night) -> None:
+    rows = plain.days.rows
+    moves = [now.tai_s for before, now in pairwise(rows) if (before.mode, now.mode) == (STANDBY, AcuMode.REMOTE)]
+    assert len(moves) == len(HEARD_TAI_S) == 2
+    assert all(begun - heard >= HORN_S for heard, begun in zip(HEARD_TAI_S, moves, strict=True))
+    assert all(begun - heard < HORN_S + 60.0 for heard, begun in zip(HEARD_TAI_S, moves, strict=True))
 
 
 def test_every_granted_pass_is_tracked_and_every_other_one_has_its_reason(plain: Night) -> None:

@@ -115,6 +115,7 @@ class StationRuns:
         self._stop_reason = ""
         self._is_placed = True  # where it waits after a pass
         self._move_until_tai_s = math.inf
+        self._warned_tai_s: float | None = None  # when the horn for the move to come began
         self._log: Any = structlog.get_logger("station")
 
     def stop(self, reason: str) -> None:
@@ -165,12 +166,23 @@ class StationRuns:
                 self.day.reload_reason = f"the system clock was set by {step_s:+.1f} s"
                 return self.day.reload_reason
             if why := self.day.look():
-                return why
-            if not self._is_placed and self.day.place_after() is not None:
-                return "the antenna is parked"
+                entry = self.day.coming()
+                return why if entry is None or self._is_warned(self.day.about(entry)) else ""
+            if not self._is_placed and (place := self.day.place_after()) is not None:
+                return "the antenna is parked" if self._is_warned({"az_deg": place[0], "el_deg": place[1]}) else ""
             return "another pass is next" if self.day.coming() != coming else ""
 
         return await self._serve(job, NoFits(), why_anew)
+
+    def _is_warned(self, about: dict[str, Any]) -> bool:
+        """Whether whoever is at the antenna was warned of a move early enough; the first call begins the warning."""
+        hooks, now_tai_s = self.day.station.hooks, self._setup.clock.tai_s()
+        if not hooks.before_move:
+            return True
+        if self._warned_tai_s is None:
+            self._warned_tai_s = now_tai_s
+            self.day.hooks.call(Hook.BEFORE_MOVE, about)
+        return now_tai_s - self._warned_tai_s >= hooks.before_move_s
 
     async def _pass(self) -> Outcome | None:
         """Track the pass that is due; None: its files are refused."""
@@ -193,8 +205,7 @@ class StationRuns:
         job = replace(job, end_tai_s=min(job.end_tai_s, entry.end_tai_s)) if is_cut else job
         if self._memory is None:  # the first of this process: as one of a single pass is resumed
             job = replace(job, state=self._kept.state, is_anew=False)
-        if self.day.station.hooks.before_move_s > 0.0:
-            self.day.hooks.call(Hook.BEFORE_MOVE, self.day.about(entry))
+        self._warned_tai_s = None
         self.day.begun(entry)
         self._is_placed = False
         try:
@@ -216,9 +227,7 @@ class StationRuns:
         control = replace(job.control, preposition_s=math.inf)
         job = replace(job, control=control, move=move_to(az_deg, el_deg, now_tai_s), satellite="")
         self._log.info("station.moves", az_deg=az_deg, el_deg=el_deg)
-        if self.day.station.hooks.before_move_s > 0.0:
-            self.day.hooks.call(Hook.BEFORE_MOVE, {"az_deg": az_deg, "el_deg": el_deg})
-            await asyncio.sleep(self.day.station.hooks.before_move_s)
+        self._warned_tai_s = None
         outcome = await self._serve(job, NoFits(), None)
         self._move_until_tai_s = math.inf
         return outcome
