@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from flights import DEMO_TAI_S, demo_target, events_named, flight_of, seconds_to_state, sky_of, the_pass
+from flights import DEMO_TAI_S, RISING_TAI_S, climb, demo_target, events_named, flight_of, seconds_to_state, sky_of, the_pass
 
 from acu_daemon.cli.options import Target
 from acu_daemon.sim.scenario import AcuChoice, SkyErrors
@@ -30,3 +30,15 @@ def test_a_satellite_10_seconds_and_a_fifth_of_a_degree_off_is_found_at_its_rise
     assert "SEARCH" in flight.states()
     assert seconds_to_state(flight, "AUTOTRACK/TLE", risen - 20.0) - 20.0 < FOUND_S
     assert events_named(flight, "search.ended")[-1]["is_found"]
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_glimpse_of_a_satellite_whose_elements_may_be_off_by_the_beam_is_not_waited_for_as_a_lock_is(
+    side: float,
+) -> None:
+    """A glimpse on the way, then silence: such a start in mid-pass waited for a minute beside the satellite."""
+    errors = SkyErrors(along_track_s=2.0 * side)
+    first_s = seconds_to_state(climb(30.0, errors=errors), "AUTOTRACK/TLE", RISING_TAI_S)
+    flight = climb(90.0, errors=errors, losses=[(first_s + 0.1, first_s + 30.0)])
+    assert 9.0 < seconds_to_state(flight, "SEARCH", RISING_TAI_S) - first_s < 12.0
+    assert seconds_to_state(flight, "AUTOTRACK/FITTED", RISING_TAI_S) < first_s + 70.0

@@ -24,7 +24,8 @@ RESUME_DEG = 5.0  # an antenna this near to the path goes on from an interruptio
 BEFORE = frozenset({TrackState.IDLE, TrackState.PREPOSITION})  # only there it matters where the antenna stands
 TO_AUTOTRACK = frozenset({Cause.ON_POINT, Cause.ON_POINT_FITTED, Cause.STILL_FITTED, Cause.STILL_SELECTED})
 TAKEOVER_S, GIVE_BACK_S = 2.0, 0.5  # before the departure, and after the return: a crossing of the zenith
-GLANCE_S = 3.0  # on the path, before a search: where the prediction is not sure to be within the beam
+# on the path, before a search: where the prediction is not sure to be within the beam; longer where a glimpse was had
+GLANCE_S = {TrackState.ACQUIRE_TLE: 3.0, TrackState.HOLD_TLE: 10.0}
 LEAVING_S = 15.0  # after a false lock; then autotrack is selected wherever the antenna is
 CHANGED_S = 3.0  # by which a fit may put off a crossing that the antenna was taken over for
 TAKEOVER_RATES = 1.2  # of the drive's rate: what autotrack cannot follow
@@ -238,16 +239,16 @@ def _of_time(state: ControlState, status: AcuStatus, given: TickInput, config: C
     is_left = not status.is_autotrack_selected and status.mode in (AcuMode.STANDBY, AcuMode.REMOTE) and not is_led
     if is_left and in_state_s > MODE_SETTLE_S:
         causes.add(Cause.MODE_LEFT)
+    early_s = _unsure_s(sky, now_tai_s, config) if track in GLANCE_S else None
+    patience_s = config.acquire_s if early_s is None else min(config.acquire_s, GLANCE_S[track])
     if track is TrackState.ACQUIRE_TLE and sky.plan is not None:
-        early_s = _unsure_s(sky, now_tai_s, config)
-        patience_s = config.acquire_s if early_s is None else min(config.acquire_s, GLANCE_S)
         is_carried = sky.prediction is not None and sky.prediction.model is Model.LAST_PASS
         begins_tai_s = came_out_tai_s(sky, now_tai_s) - (min(early_s or 0.0, ACQUIRE_LEAD_S) if is_carried else 0.0)
         waiting_s = now_tai_s - max(state.tracking.entered_tai_s, begins_tai_s)
         if waiting_s > patience_s and not is_hidden(sky, now_tai_s, config):
             causes.add(Cause.ACQUIRE_OVER)
     is_glimpse = track is TrackState.HOLD_TLE and not state.signal.has_locked  # nothing worth a long hold
-    hold_s = min(config.hold_s, config.acquire_s) if is_glimpse else config.hold_s
+    hold_s = min(config.hold_s, patience_s) if is_glimpse else config.hold_s
     if track in HOLDING and now_tai_s - state.tracking.hold_from_tai_s > hold_s:
         causes.add(Cause.HOLD_OVER)
     if track is TrackState.SEARCH and in_state_s > config.search_s:
