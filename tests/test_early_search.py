@@ -2,7 +2,17 @@
 
 import numpy as np
 import pytest
-from flights import DEMO_TAI_S, RISING_TAI_S, climb, demo_target, events_named, flight_of, seconds_to_state, sky_of, the_pass
+from flights import (
+    DEMO_TAI_S,
+    RISING_TAI_S,
+    climb,
+    demo_target,
+    events_named,
+    flight_of,
+    seconds_to_state,
+    sky_of,
+    the_pass,
+)
 
 from acu_daemon.cli.options import Target
 from acu_daemon.sim.scenario import AcuChoice, SkyErrors
