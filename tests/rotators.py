@@ -10,12 +10,13 @@ from acu_daemon.acu.driver import AcuDriver
 from acu_daemon.cli.options import Target, coming_pass
 from acu_daemon.cli.run_setup import make_job
 from acu_daemon.cli.virtual_pass import events_to
-from acu_daemon.daemon.service import Outcome, Service
+from acu_daemon.daemon.service import Outcome, Service, SignalSource
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.edge.arrivals import Arrivals
 from acu_daemon.edge.clock import Clock, LoopClock
 from acu_daemon.edge.fit import InlineFitRunner
 from acu_daemon.errors import LinkError, LinkRefusedError
+from acu_daemon.model import Reading
 from acu_daemon.sim.virtual import run_virtual
 
 PIECE_S = 0.005
@@ -160,6 +161,7 @@ class RotatorFlight:
     places: list[tuple[float, float, float]] = field(default_factory=list)
     events: list[dict[str, Any]] = field(default_factory=list)
     to_fit_count: int = 0
+    readings: list[Reading] = field(default_factory=list)
     outcome: Outcome | None = None
 
     def states(self) -> list[str]:
@@ -182,6 +184,7 @@ def fly_rotator(
     script: Sequence[tuple[float, Action]] = (),
     is_rehearsal: bool = True,
     driver: AcuDriver | None = None,
+    signal: SignalSource | None = None,
 ) -> RotatorFlight:
     """Run the daemon on a pass in virtual time.  script: what happens, in seconds from the beginning.
 
@@ -206,7 +209,15 @@ def fly_rotator(
             flight.snapshots.append(seen)
             flight.to_fit_count += len(service._area.to_fit)
 
-        service = Service(job, link, clock, InlineFitRunner(job.refit), on_snapshot=look)
+        service = Service(
+            job,
+            link,
+            clock,
+            InlineFitRunner(job.refit),
+            on_snapshot=look,
+            on_reading=flight.readings.append,
+            signal=signal,
+        )
         for at_s, action in script:
             asyncio.get_running_loop().call_later(at_s, action, link, habits, service)
         flight.outcome = await service.run()

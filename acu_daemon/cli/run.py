@@ -131,7 +131,7 @@ def command(
     Polls the ACU, writes its registers ten times a second, fits the orbit while the signal is locked and steers by the
     prediction while it is not.  Ends after the pass, after --duration, on SIGTERM or Ctrl-C, with a safe stop.
 
-    Without a signal ([receiver] signal = "none", a rotator) the pass is flown by program track.
+    Without autotrack ([receiver] signal = "none", a rotator) the pass is flown by program track.
 
     Exit status: 0 done; 1 the satellite was never acquired, of a station with a signal, or the antenna could not be
     stopped; 2 wrong use or configuration; 3 no ACU within 10 s.
@@ -195,7 +195,7 @@ def command(
         structlog.get_logger("run").info("run.done", **asdict(outcome))
     if not outcome.is_stopped:
         raise typer.Exit(1)
-    is_missed = first.job.control.has_signal and not outcome.has_acquired
+    is_missed = first.job.control.is_told_of_signal and not outcome.has_acquired
     if outcome.has_begun and is_missed and outcome.reason not in {number.name for number in STOPS}:
         raise typer.Exit(1)
 

@@ -139,6 +139,7 @@ def make_job(
         low_water_s=station.tracking.low_water_s,
         driver=driver,
         device_delay_s=station.acu.device_delay_s,
+        signal_udp=station.receiver.signal_udp,
         is_rehearsal=is_rehearsal,
         end_tai_s=end_tai_s,
         satellite=target.satellite.satellite.name,

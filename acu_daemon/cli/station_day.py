@@ -61,6 +61,8 @@ class Tracked:
     """What was seen of the pass that is on."""
 
     locked_s: float = 0.0
+    on_path_s: float = 0.0
+    is_told_of_signal: bool = True
     was_acquired: bool = False
     last_tai_s: float = math.nan
     words: str = ""
@@ -339,8 +341,11 @@ class StationDay:
             return
         if entry.state is PassState.PREPASS and seen.rise_in_s is not None and seen.rise_in_s <= 0.0:
             self.entry = entry = self._change(entry, PassState.PASS, "")
-        if seen.is_acquired and not math.isnan(tracked.last_tai_s):
-            tracked.locked_s += seen.tai_s - tracked.last_tai_s
+        tracked.is_told_of_signal = seen.is_told_of_signal
+        if not math.isnan(tracked.last_tai_s):
+            tracked.locked_s += (seen.tai_s - tracked.last_tai_s) * seen.is_acquired
+            is_on_path = entry.state is PassState.PASS and seen.is_on_path is True
+            tracked.on_path_s += (seen.tai_s - tracked.last_tai_s) * is_on_path
         tracked.last_tai_s = seen.tai_s
         if seen.is_acquired != tracked.was_acquired:
             tracked.was_acquired = seen.is_acquired
@@ -363,6 +368,8 @@ class StationDay:
     def _judged(self, entry: Entry, outcome: Outcome | None, reason: str) -> tuple[PassState, str]:
         if outcome is None:
             return PassState.FAILED, reason
+        if not self._tracked.is_told_of_signal:
+            return self._judged_by_path(entry)
         locked_s, share = self._tracked.locked_s, 0.0
         if entry.useful_s > 0.0:
             share = locked_s / entry.useful_s
@@ -373,6 +380,15 @@ class StationDay:
         if share < DEGRADED_SHARE:
             return PassState.DEGRADED, said
         return PassState.DONE, "; ".join(text for text in (said, self._tracked.words) if text)
+
+    def _judged_by_path(self, entry: Entry) -> tuple[PassState, str]:
+        """Of a station that is told of no signal: whether the antenna was where the satellite should be."""
+        on_path_s = self._tracked.on_path_s
+        said = f"by program track, on the path for {on_path_s:.0f} of {entry.useful_s:.0f} useful seconds"
+        if on_path_s == 0.0:
+            return PassState.FAILED, "; ".join(sorted(self._alarms)) or "the antenna never came to the path"
+        is_degraded = on_path_s < DEGRADED_SHARE * entry.useful_s
+        return PassState.DEGRADED if is_degraded else PassState.DONE, said
 
     def _change(self, entry: Entry, state: PassState, reason: str) -> Entry:
         changed = replace(entry, state=state, reason=reason)

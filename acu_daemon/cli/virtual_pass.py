@@ -17,12 +17,13 @@ from acu_daemon.assist.session.refit import RefitSetup
 from acu_daemon.cli.options import Target, coming_pass
 from acu_daemon.cli.run_setup import make_job
 from acu_daemon.cli.simulated import station_air
-from acu_daemon.daemon.service import Outcome, Service
+from acu_daemon.daemon.service import Outcome, Service, SignalSource
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.drivers.sa3842.codec import CommandDecoder, address_byte
 from acu_daemon.drivers.sa3842.messages import Command
 from acu_daemon.edge.clock import LoopClock
 from acu_daemon.edge.fit import FitRunner, InlineFitRunner
+from acu_daemon.model import Reading
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.acu_faults import break_acu
 from acu_daemon.sim.build import make_sky
@@ -46,6 +47,7 @@ class Flight:
     writes: list[RegisterWrite] = field(default_factory=list)  # what the ACU accepted
     events: list[dict[str, Any]] = field(default_factory=list)  # the log
     outcome: Outcome | None = None
+    readings: list[Reading] = field(default_factory=list)
     estimates: list[PassEstimate] = field(default_factory=list)  # what the pass said of the pedestal, with a memory
 
     def states(self) -> list[str]:
@@ -102,13 +104,14 @@ def fly(
     make_acu: Callable[[AcuParts], FakeAcu] = FakeAcu,
     make_clock: Callable[[float], LoopClock] = LoopClock,
     make_runner: Callable[[RefitSetup], FitRunner] = InlineFitRunner,
+    signal: SignalSource | None = None,
 ) -> Flight:
     """Run the daemon on a pass in virtual time.
 
     sky: as the antenna meets it (make_sky), or a truth CSV, which is geometric.  script: what happens to the ACU and
     the link, each at its TAI, such as a power cycle.
     memory: what the station knows of its antenna; None: it keeps no such thing.
-    make_...: other parts than the usual ones, such as a clock that stalls.
+    make_...: other parts than the usual ones, such as a clock that stalls.  signal: of a receiver beside the ACU.
     """
     flight = Flight()
     truth = sky
@@ -148,6 +151,8 @@ def fly(
             make_runner(job.refit),
             on_snapshot=flight.snapshots.append,
             on_estimate=flight.estimates.append,
+            on_reading=flight.readings.append,
+            signal=signal,
         )
         loop = asyncio.get_running_loop()
         for tai_s, action in script:

@@ -205,7 +205,7 @@ class StationFile(Section):
         if self.receiver.signal == "acu" and not acu.has_autotrack:
             raise ValueError(
                 f'receiver.signal = "acu": an ACU with dialect = "{self.acu.dialect}" has no autotrack and tells of no '
-                'signal; leave it out, or say signal = "none" (program track)'
+                'signal; leave it out, or say signal = "none" (program track) or "udp://ADDRESS:PORT"'
             )
         error_deg = self.safety.following_error_deg
         if self.safety.following_error_s and acu.dead_band_deg > error_deg / 2:
@@ -217,9 +217,11 @@ class StationFile(Section):
 
     @property
     def has_signal(self) -> bool:
-        """Whether a pass is tracked by its signal; else it is flown by program track."""
-        signal = self.receiver.signal
-        return self.acu.driver().capabilities.has_autotrack if signal is None else signal == "acu"
+        """Whether a pass is tracked by autotrack, which follows the signal; else it is flown by program track."""
+        receiver = self.receiver
+        if receiver.signal == "none" or receiver.program_track:
+            return False
+        return self.acu.driver().capabilities.has_autotrack
 
     @property
     def site(self) -> Site:

@@ -45,6 +45,7 @@ def control_config(
         acu=driver.capabilities,
         response_time_s=station.envelope.response_time_s,
         has_signal=station.has_signal,
+        receiver=station.receiver.signal_rules(),
         clock_alarm_deg=station.safety.clock_alarm_beam_fraction * station.receiver.beamwidth_deg,
         following=Bounds(station.safety.following_error_deg, station.safety.following_error_s),
     )

@@ -2,9 +2,10 @@
 
 from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from acu_daemon.config.section import Positive, Section
+from acu_daemon.config.section import Name, Positive, Section
+from acu_daemon.control.receiver_signal import MOST_DB, SignalRules
 
 LEAST_LOW_WATER_S = 4.0  # a niced fit on a busy machine takes a second: less would end good ones (daemon.background)
 
@@ -28,14 +29,67 @@ class ReceiverSection(Section):
             "and what a glimpse of signal is worth."
         ),
     )
-    signal: Literal["acu", "none"] | None = Field(
+    signal: Name | None = Field(
         default=None,
-        json_schema_extra={"range": "`acu`, `none`"},
+        json_schema_extra={"range": "`acu`, `none`, `udp://ADDRESS:PORT`"},
         description=(
-            "Who says that the signal is there: the ACU, which follows it (autotrack), or nobody.  Decides whether a "
-            "pass is tracked by its signal or flown by program track.  Left out: `acu` where the ACU has autotrack."
+            "Who says that the signal is there: the ACU, which follows it (autotrack), nobody, or a receiver beside it "
+            "in UDP datagrams (docs/receivers.md), which can only deny what the ACU calls acquired.  Decides whether a "
+            "pass is tracked by its signal or flown by program track, and what is told of lock and loss.  Left out: "
+            "`acu` where the ACU has autotrack."
         ),
     )
+    program_track: bool = Field(
+        default=False,
+        description=(
+            "With `udp://`: the antenna is led along the prediction though the ACU has autotrack.  Decides whether "
+            "anything is fitted: nothing is by program track."
+        ),
+    )
+    signal_lock_db: float = Field(
+        default=SignalRules().lock_db,
+        ge=-MOST_DB,
+        le=MOST_DB,
+        description=(
+            "With `udp://`, where the receiver tells a level alone: from here on it is locked, in the receiver's own "
+            "dB.  Decides lock, loss and hold."
+        ),
+    )
+    signal_unlock_db: float = Field(
+        default=SignalRules().unlock_db,
+        ge=-MOST_DB,
+        le=MOST_DB,
+        description="Below it it is locked no more; less than `signal_lock_db`.  Decides the same.",
+    )
+
+    @field_validator("signal")
+    @classmethod
+    def _is_source(cls, value: str | None) -> str | None:
+        if value in (None, "acu", "none"):
+            return value
+        scheme, _, address = value.partition("://")
+        host, _, port = address.rpartition(":")
+        if scheme != "udp" or not host or not port.isdecimal() or not 1 <= int(port) <= 65535:
+            raise ValueError("expected acu, none, or udp://ADDRESS:PORT, such as udp://127.0.0.1:4842")
+        return value
+
+    @model_validator(mode="after")
+    def _is_a_receiver(self) -> "ReceiverSection":
+        self._must_be_below("signal_unlock_db", "signal_lock_db")
+        if self.program_track and self.signal_udp is None:
+            raise ValueError(
+                'program_track = true: expected signal = "udp://ADDRESS:PORT"; with "none" it is so anyway'
+            )
+        return self
+
+    @property
+    def signal_udp(self) -> str | None:
+        """ADDRESS:PORT of this machine to which a receiver sends; None: none does."""
+        return self.signal.removeprefix("udp://") if self.signal and self.signal.startswith("udp://") else None
+
+    def signal_rules(self) -> SignalRules | None:
+        """How what it sends is judged; None: none does."""
+        return None if self.signal_udp is None else SignalRules(self.signal_lock_db, self.signal_unlock_db)
 
 
 class ReadingsSection(Section):

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from acu_daemon.acu.capabilities import Capabilities
+from acu_daemon.control.receiver_signal import SignalRules
 from acu_daemon.control.safety.axis_watch import Bounds
 from acu_daemon.model import AxisLimits
 from acu_daemon.pointing.envelope import Envelope
@@ -41,9 +42,15 @@ class ControlConfig:
     acu: Capabilities = Capabilities()
     response_time_s: float = 60.0  # an antenna that may not be moved, and that the sun reaches within it, is an alarm
     has_signal: bool = True  # autotrack gives one; else a pass is flown by program track
+    receiver: SignalRules | None = None  # of a receiver beside the ACU; None: there is none that tells
     clock_alarm_deg: float = 0.1  # an error of UTC counts from here on, at the sky's present rate
     azimuth: AxisLimits = field(init=False)  # the envelope's
     elevation: AxisLimits = field(init=False)
+
+    @property
+    def is_told_of_signal(self) -> bool:
+        """Whether anybody tells of the signal, the ACU or a receiver beside it."""
+        return self.has_signal or self.receiver is not None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "azimuth", self.envelope.azimuth)

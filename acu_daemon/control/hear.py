@@ -1,7 +1,7 @@
 """A reply as it comes in: is it to be believed, when was it so, and may it be fitted?  Pure.
 
-Owner of the plausibility of the statuses and of `Fitting`.  What is heard between two ticks is gathered in an
-Observation for the next one; the fit is given its readings at once.
+Owner of the plausibility of the statuses, of `Fitting` and of what a receiver beside the ACU says.  What is heard
+between two ticks is gathered in an Observation for the next one; the fit is given its readings at once.
 """
 
 from dataclasses import dataclass, replace
@@ -10,6 +10,8 @@ from acu_daemon.acu.commands import PointAndPoll, Poll
 from acu_daemon.acu.replies import AcuStatus, Refused
 from acu_daemon.assist.reading_gate import acquired_since_tai_s
 from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.orders import Event
+from acu_daemon.control.receiver_signal import SignalSample, judge_signal
 from acu_daemon.control.safety.status_plausibility import judge
 from acu_daemon.control.state import ControlState, Fitting
 from acu_daemon.control.tick_input import Arrival, Exchange, Observation
@@ -48,6 +50,7 @@ def _hear_status(
     plausibility = judge(state.plausibility, status, tai_s, config.azimuth, config.elevation, config.acu.silence_s)
     if not plausibility.is_believed:
         return with_parts(state, plausibility=plausibility), Heard(seen, doubt=plausibility.reason)
+    status = _unless_denied(status, state, tai_s, config)
     reading = Reading(tai_s, status.az_deg, status.el_deg, is_acquired(status), status.agc_db)
     seen = replace(
         seen,
@@ -62,6 +65,29 @@ def _hear_status(
     is_tracked = config.acu.has_autotrack and state.tracking.track in AUTOTRACKING
     is_to_fit = is_locked and arrival.is_sure and is_tracked and not state.encoders.problem
     return with_parts(state, plausibility=plausibility, fitting=fitting), Heard(seen, reading, is_to_fit)
+
+
+def take_receiver(
+    state: ControlState, sample: SignalSample | None, config: ControlConfig, events: list[Event]
+) -> ControlState:
+    """Take what a receiver beside the ACU has said; a change is told."""
+    if config.receiver is None or sample is None:
+        return state
+    before, receiver = state.receiver, judge_signal(state.receiver, sample, config.receiver)
+    if receiver is before:
+        return state
+    if receiver.is_locked is not before.is_locked:
+        fields = {} if receiver.level_db is None else {"level_db": round(receiver.level_db, 2)}
+        events.append(Event("signal.locked" if receiver.is_locked else "signal.lost", fields))
+    return with_parts(state, receiver=receiver)
+
+
+def _unless_denied(status: AcuStatus, state: ControlState, tai_s: float, config: ControlConfig) -> AcuStatus:
+    """A signal that the ACU follows, and in which the receiver does not find the satellite's, is not acquired."""
+    rules, receiver = config.receiver, state.receiver
+    if rules is None or not status.is_acquired or receiver.is_locked or not receiver.is_known(tai_s, rules):
+        return status
+    return replace(status, is_acquired=False)
 
 
 def _sample_tai_s(arrival: Arrival, config: ControlConfig) -> float:

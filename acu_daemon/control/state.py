@@ -12,6 +12,7 @@ from math import inf
 from acu_daemon.acu.commands import Command
 from acu_daemon.acu.replies import AcuIdentity, AcuStatus
 from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.receiver_signal import ReceiverSignal
 from acu_daemon.control.safety.axis_watch import AxesWatch
 from acu_daemon.control.safety.encoder_watch import EncoderWatch
 from acu_daemon.control.safety.status_plausibility import Plausibility
@@ -244,6 +245,7 @@ class ControlState:
 
     plausibility: Plausibility = Plausibility()  # owner: control.hear
     fitting: Fitting = Fitting()
+    receiver: ReceiverSignal = ReceiverSignal()  # owner: control.hear
     intake: Intake = Intake()
     startup: Startup = Startup()
     arming: Arming = Arming()

@@ -10,6 +10,7 @@ import math
 from acu_daemon.acu.commands import Poll
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.extra_exchange import needs_no_poll, note_asked, wait_after_refusal, wanted_extra
+from acu_daemon.control.hear import take_receiver
 from acu_daemon.control.intake import take_status
 from acu_daemon.control.orders import Event, Orders
 from acu_daemon.control.registers import (
@@ -65,6 +66,7 @@ def take_in(state: ControlState, given: TickInput, config: ControlConfig, events
     """Take in what the last tick brought; facts for the log are added to events."""
     seen, now_tai_s = given.seen, given.now_tai_s
     status, reading, extra = seen.status, seen.reading, seen.extra
+    state = take_receiver(state, given.signal, config, events)
     if seen.refused is not None:
         state = take_refusal(state, now_tai_s, events)
     if status is not None and reading is not None:

@@ -5,6 +5,7 @@ from enum import StrEnum
 
 from acu_daemon.acu.commands import Command
 from acu_daemon.acu.replies import AcuStatus, Refused, Reply
+from acu_daemon.control.receiver_signal import SignalSample
 from acu_daemon.model import FitResult, Prediction, Reading, ZenithCrossing
 from acu_daemon.pointing.reach import OutOfReach
 from acu_daemon.pointing.turn_plan import Unwinding
@@ -101,3 +102,4 @@ class TickInput:
     seen: Observation
     sky: Sky
     now_tai_s: float
+    signal: SignalSample | None = None  # what a receiver beside the ACU has said since the last tick

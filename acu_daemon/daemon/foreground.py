@@ -22,6 +22,7 @@ from acu_daemon.acu.replies import AcuIdentity, AcuStatus, Done, FaultReport, Re
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.hear import hear
 from acu_daemon.control.orders import Event
+from acu_daemon.control.receiver_signal import SignalSample
 from acu_daemon.control.safety.arming import owes_stop
 from acu_daemon.control.safety.interlock import question
 from acu_daemon.control.state import StartStage, Watchdog
@@ -59,13 +60,16 @@ class Foreground:
         *,
         after_tick: Callable[[], None],
         on_reading: Callable[[Reading], None] | None = None,
+        signal: Callable[[float], SignalSample | None] | None = None,
     ) -> None:
+        """signal: what a receiver beside the ACU has said since it was asked last, by TAI; None: there is none."""
         self._area = area
         self._port = port
         self._clock = clock
         self._config = config
         self._after_tick = after_tick
         self._on_reading = on_reading
+        self._signal = signal
         self._doubt_again_s = -math.inf
         self._seen = Observation()
         self._requests: tuple[Request, ...] = ()
@@ -161,7 +165,8 @@ class Foreground:
             has_room=port.has_room,
             requests=requests,
         )
-        given = TickInput(seen, area.sky, self._clock.tai_s())
+        now_tai_s = self._clock.tai_s()
+        given = TickInput(seen, area.sky, now_tai_s, None if self._signal is None else self._signal(now_tai_s))
         area.state, orders = tick(area.state, given, self._config)
         self._report(orders.events)
         self._seen = Observation()

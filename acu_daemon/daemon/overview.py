@@ -56,7 +56,7 @@ _STEERS = {
     S.ACQUIRE_TLE: "the daemon, by the elements; autotrack takes over with the signal",
     S.AUTOTRACK_TLE: "the ACU's autotrack; the elements would take over",
     S.AUTOTRACK_FITTED: "the ACU's autotrack; this pass's fit would take over",
-    S.PROGRAM: "the daemon, along the predicted path; no signal is waited for",
+    S.PROGRAM: "the daemon, along the predicted path, with or without a signal",
     S.HOLD_FITTED: "the daemon, by this pass's fit; autotrack takes over with the signal",
     S.HOLD_TLE: "the daemon, by the elements; autotrack takes over with the signal",
     S.SEARCH: "the daemon, around the path; autotrack takes over with the signal",
@@ -133,7 +133,13 @@ def _signal(seen: Snapshot) -> str:
     if not seen.is_link_up:
         return "not known: no link"
     agc = f", AGC {seen.agc_db:.1f} dB" if seen.agc_db is not None else ""
-    return f"{'acquired, by the ACU' if seen.is_acquired else 'not acquired'}{agc}"
+    if not seen.is_told_of_signal:
+        return "nobody tells of it"
+    beside = "" if seen.signal_db is None or seen.signal_age_s is None else f", receiver {seen.signal_db:.1f} dB"
+    beside += "" if seen.signal_age_s is None else f" {seen.signal_age_s:.1f} s ago"
+    lost = f" for {seen.signal_lost_s:.0f} s" if seen.signal_lost_s is not None else ""
+    who = "a receiver" if seen.state == TrackState.PROGRAM else "the ACU"
+    return f"{f'acquired, by {who}' if seen.is_acquired else f'not acquired{lost}'}{agc}{beside}"
 
 
 def _prediction(seen: Snapshot) -> str:

@@ -4,7 +4,7 @@ import asyncio
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import structlog
 
@@ -13,6 +13,7 @@ from acu_daemon.acu.replies import beyond_own_limits
 from acu_daemon.assist.mount_memory.whole_pass import PassEstimate
 from acu_daemon.assist.session.refit import RefitSetup
 from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.receiver_signal import SignalSample
 from acu_daemon.control.safety.arming import begin_run
 from acu_daemon.control.safety.foreign_stop import release
 from acu_daemon.control.state import ControlState, remembered
@@ -30,6 +31,7 @@ from acu_daemon.daemon.taking import take_snapshot
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.fit import FitRunner
 from acu_daemon.edge.link import Link
+from acu_daemon.edge.signal_reader import SignalReader
 from acu_daemon.errors import NoAcuError, UsageError
 from acu_daemon.model import FitResult, Pass, Reading
 from acu_daemon.orbit.timescales import utc_text
@@ -38,6 +40,16 @@ from acu_daemon.pointing.reach import zenith_text
 
 FIRST_POLL_S = 10.0  # no good poll within this of the start ends the run
 LOOK_TICKS = 10
+
+
+class SignalSource(Protocol):
+    """What tells of the signal beside the ACU."""
+
+    async def open(self) -> None: ...
+
+    def now(self, now_tai_s: float, /) -> SignalSample | None: ...
+
+    def close(self) -> None: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +72,7 @@ class PassJob:
     next_passes: tuple[str, ...] = ()  # after this one, for people
     move: PassPlan | None = None  # only go there, before a pass or after it
     is_anew: bool = False  # not the first run of this daemon: the ACU was there
+    signal_udp: str | None = None  # ADDRESS:PORT at which a receiver beside the ACU tells of the signal
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,11 +119,14 @@ class Service:
         elements_problem: Callable[[], str] = str,
         on_end: Callable[[], None] | None = None,
         why_anew: Callable[[bool, float], str] | None = None,
+        signal: SignalSource | None = None,
     ) -> None:
         """on_end: called when the run is over, before the safe stop, which may take stopping.DEADLINE_S.
 
         why_anew: asked once a second, until the pass is acquired, whether the run is to begin anew, and why; is told
         whether the antenna waits, and by how many seconds the system clock has stepped.
+
+        signal: what tells of the signal beside the ACU, in the place of a reader of job.signal_udp.
         """
         self._job = job
         self._clock = clock
@@ -123,6 +139,9 @@ class Service:
         self._files_alarm = files_alarm
         self._elements_problem = elements_problem
         self._why_anew = why_anew
+        self._signal: SignalSource | None = signal
+        if signal is None and job.signal_udp is not None:
+            self._signal = SignalReader(job.signal_udp, has_own_time=not job.is_rehearsal)
         self.anew_reason = ""  # why the run has ended: another is to follow at once
         self._is_over = asyncio.Event()
         self._stop_reason = ""
@@ -142,7 +161,13 @@ class Service:
             on_estimate=on_estimate,
         )
         self._foreground = Foreground(
-            self._area, self._port, clock, job.control, after_tick=self._after_tick, on_reading=on_reading
+            self._area,
+            self._port,
+            clock,
+            job.control,
+            after_tick=self._after_tick,
+            on_reading=on_reading,
+            signal=None if self._signal is None else self._signal.now,
         )
         self._hands = Hands(self._area, job.control, self._foreground.ask, self.snapshot)
 
@@ -156,6 +181,8 @@ class Service:
         Raises: NoAcuError: no good poll at the start.  UsageError: a rehearsal on a real ACU.
         """
         reason, is_stopped = "error", False
+        if self._signal is not None:
+            await self._signal.open()
         try:
             async with asyncio.TaskGroup() as outer:
                 link = outer.create_task(self._port.keep(), name="link")
@@ -167,6 +194,10 @@ class Service:
                     await self._runner.close()
         except ExceptionGroup as group:
             raise _innermost(group) from None
+        finally:
+            if self._signal is not None:
+                self._signal.close()
+                await asyncio.sleep(0)  # until then the address is taken, and another run may want it
         return self._outcome(reason, is_stopped)
 
     async def _end(self) -> bool:

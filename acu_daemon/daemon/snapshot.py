@@ -105,6 +105,11 @@ class Snapshot:
     envelope_alarm: str = ""  # an antenna that the daemon may not move, or does not, before a keep-out
     is_hidden: bool = False  # the path is behind the mask, and nothing is heard
     hidden_s: float | None = None  # until it comes out again, while it is
+    signal_db: float | None = None  # as a receiver beside the ACU said last
+    signal_age_s: float | None = None  # since it said it
+    signal_lost_s: float | None = None  # since it lost a lock of this pass
+    signal_alarm: str = ""  # it says nothing
+    is_told_of_signal: bool = True  # by the ACU or a receiver beside it
 
 
 def snapshot_of(values: Mapping[str, Any]) -> Snapshot:

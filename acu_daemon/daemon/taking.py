@@ -2,14 +2,16 @@
 
 from dataclasses import replace
 from math import isfinite
+from typing import Any
 
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick_input import Sky
 from acu_daemon.control.tracking.hills import hidden_until_tai_s, is_hidden
 from acu_daemon.control.tracking.off_path import off_path
+from acu_daemon.control.tracking.path_offset import is_heard_beside
 from acu_daemon.control.tracking.scan import covered_text
-from acu_daemon.control.tracking.state_table import AUTOTRACKING, TrackState
+from acu_daemon.control.tracking.state_table import AUTOTRACKING, TRACKING, TrackState
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.envelope_watch import look_around
 from acu_daemon.daemon.foreground import Foreground
@@ -50,6 +52,7 @@ def take_snapshot(
         envelope_alarm=around.alarm,
         is_hidden=is_behind,
         hidden_s=None if until_tai_s is None else until_tai_s - now_tai_s,
+        **_receiver(state, now_tai_s, control),
         utc=utc_text(now_tai_s, 1),
         satellite=subject.satellite,
         station=subject.station,
@@ -102,7 +105,7 @@ def _seen(
         agc_db=status.agc_db if status else None,
         search=covered_text(state.search.scan, prediction, control) if state.search.scan.rows else "",
         false_lock_count=state.false_lock.count,
-        is_acquired=state.tracking.track is not TrackState.LINK_LOST and reading is not None and reading.is_locked,
+        is_acquired=state.tracking.track is not TrackState.LINK_LOST and _is_acquired(state, now_tai_s, control),
         miss_deg=None if state.tracking.track is TrackState.LINK_LOST else _miss_deg(reading, prediction),
         along_s=sky.fit.along_s if sky.fit else None,
         across_deg=sky.fit.across_deg if sky.fit else None,
@@ -154,6 +157,30 @@ def _arming(state: ControlState, control: ControlConfig) -> str:
     if control.is_shadow:
         return "shadow"
     return "armed" if state.is_armed_by_people(control) else "disarmed"
+
+
+def _is_acquired(state: ControlState, now_tai_s: float, control: ControlConfig) -> bool:
+    """Whether autotrack holds the signal or, in program track, a receiver beside the ACU has it."""
+    reading = state.intake.reading
+    is_led = state.tracking.track is TrackState.PROGRAM
+    return (reading is not None and reading.is_locked) or (is_led and is_heard_beside(state, now_tai_s, control))
+
+
+def _receiver(state: ControlState, now_tai_s: float, control: ControlConfig) -> dict[str, Any]:
+    """What is told by a receiver beside the ACU."""
+    receiver, rules = state.receiver, control.receiver
+    told: dict[str, Any] = {"is_told_of_signal": control.is_told_of_signal}
+    if rules is None:
+        return told
+    if receiver.known_tai_s is not None:
+        told |= {"signal_db": receiver.level_db, "signal_age_s": now_tai_s - receiver.known_tai_s}
+    is_of_pass = state.tracking.track in TRACKING and state.signal.has_acquired
+    if is_of_pass and receiver.lost_tai_s is not None:
+        told["signal_lost_s"] = now_tai_s - receiver.lost_tai_s
+    if state.tracking.track in TRACKING and not receiver.is_known(now_tai_s, rules):
+        for_s = "" if receiver.known_tai_s is None else f" for {now_tai_s - receiver.known_tai_s:.0f} s"
+        told["signal_alarm"] = f"the receiver says nothing of the signal{for_s}"
+    return told
 
 
 def _miss_deg(reading: Reading | None, prediction: Prediction | None) -> float | None:

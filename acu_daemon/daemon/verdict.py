@@ -120,7 +120,21 @@ def _by_program(seen: Snapshot) -> Verdict:
     path = f"the path of the {seen.path}" if seen.path else "the path"
     if seen.is_on_path is not True:
         return Verdict("OFF PATH", Level.BAD, f"program track, and the antenna is half a beam or more off {path}")
+    if seen.signal_age_s is not None and not seen.signal_alarm:
+        return _heard_beside(seen, path)
     return Verdict("PROGRAM TRACK", Level.GOOD, f"the antenna is led along {path}; no signal is waited for")
+
+
+def _heard_beside(seen: Snapshot, path: str) -> Verdict:
+    """Program track with a receiver that tells of the signal."""
+    if seen.is_acquired:
+        return Verdict("TRACKING", Level.GOOD, f"a receiver has the signal; the antenna is led along {path}")
+    if seen.signal_lost_s is not None:
+        why = f"the signal is lost for {seen.signal_lost_s:.0f} s; the antenna is led along {path}"
+        return Verdict("HOLDING", Level.WATCH, why)
+    is_up = seen.rise_in_s is None or seen.rise_in_s <= 0.0
+    level = Level.WATCH if is_up else Level.CALM
+    return Verdict("NO SIGNAL YET", level, f"the antenna is led along {path}")
 
 
 def _blind(seen: Snapshot, state: TrackState) -> Verdict:
@@ -166,6 +180,7 @@ def alarms(seen: Snapshot) -> list[str]:
         seen.limit_alarm,
         seen.clock_alarm,
         seen.line_alarm,
+        seen.signal_alarm,
         f"not fitted, rejecting: {seen.rejecting}" if not_fitted(seen) else "",
         f"not written: {seen.files_alarm}" if seen.files_alarm else "",
     )

@@ -37,7 +37,7 @@ def finite_only(given: TickInput) -> tuple[TickInput, str]:
         plan = None
     if not refused and seen is given.seen:
         return given, ""
-    return TickInput(seen, Sky(prediction, fit, plan), given.now_tai_s), ", ".join(refused)
+    return replace(given, seen=seen, sky=Sky(prediction, fit, plan)), ", ".join(refused)
 
 
 def _is_prediction(prediction: Prediction) -> bool:

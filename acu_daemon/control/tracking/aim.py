@@ -3,13 +3,14 @@
 from dataclasses import replace
 from math import copysign
 
+from acu_daemon.acu.commands import AcuMode
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick_input import Sky
 from acu_daemon.control.tracking.causes import path_point
 from acu_daemon.control.tracking.path_offset import learned_point
 from acu_daemon.control.tracking.scan import pointing
-from acu_daemon.control.tracking.state_table import ACTIVE, AUTOTRACKING, TrackState
+from acu_daemon.control.tracking.state_table import ACTIVE, AUTOTRACKING, HOLDING, TrackState
 from acu_daemon.model import Pointing
 from acu_daemon.pointing.wrap import nearest_turn
 
@@ -43,11 +44,19 @@ def _ahead(rate_deg_s: float) -> float:
 def _point(
     state: ControlState, sky: Sky, aim_tai_s: float, config: ControlConfig, *, is_followed: bool
 ) -> Pointing | None:
-    if state.tracking.track not in ACTIVE or (not is_followed and state.tracking.track not in AUTOTRACKING):
+    may_jump = not is_followed and state.tracking.track not in AUTOTRACKING and not _is_denied(state, config)
+    if state.tracking.track not in ACTIVE or may_jump:
         return None  # a mode that follows the registers must find them where the antenna is, not where it shall go
     if state.tracking.track is TrackState.SEARCH and sky.prediction is not None:
         return pointing(state.search.scan, sky.prediction, aim_tai_s, config) or path_point(sky, aim_tai_s)
     return learned_point(state, sky, aim_tai_s, follow=is_followed) or path_point(sky, aim_tai_s, follow=is_followed)
+
+
+def _is_denied(state: ControlState, config: ControlConfig) -> bool:
+    """Whether the ACU goes on to follow a signal that the receiver beside it denies: the path is held ready."""
+    status = state.intake.status
+    is_autotracking = status is not None and status.mode is AcuMode.AUTOTRACK
+    return config.receiver is not None and is_autotracking and state.tracking.track in HOLDING
 
 
 def _rest(state: ControlState, *, is_followed: bool) -> Pointing:

@@ -52,7 +52,8 @@ def learn_of_signal(state: ControlState, given: TickInput, config: ControlConfig
     if seen.status is None or seen.reading is None:
         return state
     signal, track, tai_s = state.signal, state.tracking.track, seen.reading.tai_s
-    if not is_acquired(seen.status) or track not in AUTOTRACKING:
+    is_ours = is_acquired(seen.status) and track in AUTOTRACKING
+    if not is_ours and not (track is TrackState.PROGRAM and is_heard_beside(state, given.now_tai_s, config)):
         if signal.acquired_since_tai_s is None:
             return state
         return with_parts(state, signal=replace(signal, acquired_since_tai_s=None))
@@ -64,6 +65,12 @@ def learn_of_signal(state: ControlState, given: TickInput, config: ControlConfig
     if track is TrackState.AUTOTRACK_TLE and seen.is_in_step:
         new = _learn_offset(new, seen.reading, given.sky, config, events)
     return state if new is signal else with_parts(state, signal=new)
+
+
+def is_heard_beside(state: ControlState, now_tai_s: float, config: ControlConfig) -> bool:
+    """Whether a receiver beside the ACU is locked, by a word that still counts."""
+    rules, receiver = config.receiver, state.receiver
+    return rules is not None and receiver.is_locked and receiver.is_known(now_tai_s, rules)
 
 
 def _learn_offset(signal: Signal, reading: Reading, sky: Sky, config: ControlConfig, events: list[Event]) -> Signal:
