@@ -345,9 +345,7 @@ async def test_an_example_of_a_receiver_reaches_the_daemon(
             (tmp_path / "rtl_power").write_text(RTL_POWER)
             (tmp_path / "rtl_power").chmod(0o755)
             path = f"{tmp_path}:{Path(sys.executable).parent}:/usr/bin:/bin"
-            started.append(
-                subprocess.Popen(["bash", "-c", text], env={"PATH": path}, text=True, start_new_session=True)
-            )
+            started.append(begun(["bash", "-c", text], env={"PATH": path}))
         found = await first_word(reader)
     finally:
         reader.close()
