@@ -21,7 +21,7 @@ from promise_judge import Judge
 import acu_daemon.edge.carry_over_file as carry_over_file
 import acu_daemon.edge.clock as clock_file
 import acu_daemon.edge.run_state as run_state_file
-from acu_daemon.acu.commands import AcuMode, SelectMode, Stop
+from acu_daemon.acu.commands import AcuMode, SelectMode, Stop, Stow
 from acu_daemon.assist.session.refit import RefitReply, RefitRequest, RefitSetup
 from acu_daemon.cli.kept import open_kept
 from acu_daemon.cli.options import Target, coming_pass
@@ -29,7 +29,7 @@ from acu_daemon.cli.run_setup import make_job
 from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.drivers.sa3842.codec import CommandDecoder, address_byte
-from acu_daemon.drivers.sa3842.messages import Command, Status, Stow
+from acu_daemon.drivers.sa3842.messages import Command, Status
 from acu_daemon.edge.clock import LoopClock, SystemClock
 from acu_daemon.edge.fit import FitDiedError, InlineFitRunner
 from acu_daemon.edge.writer import replace_file

@@ -13,6 +13,7 @@ from acu_daemon.acu.commands import PointAndPoll, PointAt, command_text
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.orders import Orders
 from acu_daemon.control.state import ControlState
+from acu_daemon.control.tick_input import StowBy
 from acu_daemon.drivers.sa3842.sa3842_driver import wire_command
 
 RECORDED = Path(__file__).parent / "recorded_decisions.txt"
@@ -32,7 +33,7 @@ def facts(state: ControlState, orders: Orders, config: ControlConfig) -> dict[st
         "held": state.foreign_stop.held is not None,
         "doubted": state.foreign_stop.is_doubted,
         "faults_read": state.interlock.faults_read is not None,
-        "stow_kept": state.intake.is_stow_kept,
+        "stow_kept": state.stow.stow_by is StowBy.PANEL,
         "latch": state.latch.problem,
         "turn": state.turn.phase.name,
         "turn_sure": state.turn.is_sure,

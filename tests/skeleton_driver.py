@@ -29,6 +29,7 @@ class SkeletonDriver:
         has_sector_bit=False,
         has_turn_choice=False,
         has_register_watchdog=False,
+        has_stow=False,
         has_read_back=False,
         has_combined_write=False,
         is_azimuth_continuous=True,

@@ -42,6 +42,7 @@ class TaggedDriver:
         has_sector_bit=False,
         has_turn_choice=False,
         has_register_watchdog=False,
+        has_stow=False,
         has_read_back=False,
         angle_step_deg=0.001,
     )

@@ -19,7 +19,8 @@ from acu_daemon.edge.state_directory import StateOwner, antenna_directory
 from acu_daemon.errors import AcuDaemonError, UsageError
 
 
-def answer(line: str) -> str:
+def answer(line: str, who: str) -> str:
+    assert who == f"uid {os.getuid()} on this machine"
     return {"status": 'ok {"state": "IDLE"}', "arm": "error this daemon runs with --shadow"}.get(line, f"ok {line}")
 
 
@@ -182,8 +183,8 @@ async def test_of_several_daemons_each_is_listed_with_a_command_that_reaches_it(
     folders = {name: antenna_directory(state, StateOwner.of(name, url, "1")) for name, url in urls.items()}
     station = f'[station]\nname = "two"\n{STATION.split("[station]")[1]}'.replace(urls["one"], urls["two"])
     config = write(tmp_path / "config", station)
-    one = ControlSocket(folders["one"], lambda _: "ok one")
-    two = ControlSocket(folders["two"], lambda _: "ok two; look, then `acu-daemon clear`")
+    one = ControlSocket(folders["one"], lambda _line, _who: "ok one")
+    two = ControlSocket(folders["two"], lambda _line, _who: "ok two; look, then `acu-daemon clear`")
     for word in ("arm", "disarm", "clear"):
         await one.open()
         alone = await asyncio.to_thread(acu_daemon, word, "--state", state)

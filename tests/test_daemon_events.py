@@ -28,7 +28,7 @@ from flights import (
     worst_error_deg,
 )
 
-from acu_daemon.acu.commands import AcuMode, Identify, Poll, ReadFaults, SelectMode, Stop
+from acu_daemon.acu.commands import AcuMode, Identify, Poll, ReadFaults, SelectMode, Stop, Stow
 from acu_daemon.assist.session.refit import RefitReply, RefitRequest, RefitSetup, predict_from
 from acu_daemon.cli.virtual_pass import Flight, ScriptAccess
 from acu_daemon.config.tracking_tables import LEAST_LOW_WATER_S
@@ -41,7 +41,6 @@ from acu_daemon.drivers.sa3842.messages import (
     ReadRegisters,
     Reply,
     ResetFault,
-    Stow,
     WriteAndPoll,
     WriteParameter,
     WriteRegisters,

@@ -12,6 +12,7 @@ from test_tick import status as of_autotrack
 
 from acu_daemon.acu.capabilities import Capabilities
 from acu_daemon.acu.commands import (
+    STOW_MODES,
     AcuMode,
     Backup,
     Command,
@@ -28,6 +29,7 @@ from acu_daemon.acu.commands import (
     SelectMode,
     SetWatchdog,
     Stop,
+    Stow,
 )
 from acu_daemon.acu.driver import AcuDriver
 from acu_daemon.acu.replies import (
@@ -66,6 +68,7 @@ PROMISED: list[tuple[Command, type[Reply], str]] = [  # the reply, and the capab
     (FreeTurnChoice(), Done, "has_turn_choice"),
     (ReadWatchdog(), WatchdogTime, "has_register_watchdog"),
     (SetWatchdog(5.0), Done, "has_register_watchdog"),
+    (Stow(), Done, "has_stow"),
 ]
 benches = pytest.mark.parametrize("bench", BENCHES, ids=lambda bench: bench.name)
 
@@ -193,6 +196,22 @@ def test_the_antenna_goes_where_it_is_told_in_remote_and_its_status_says_so(benc
     assert table.off_deg(THERE) <= can.dead_band_deg + 2.0 * can.angle_step_deg
     assert abs(wrap_180(status.az_deg - THERE.az_deg)) <= can.dead_band_deg + 0.2
     assert (status.turns_deg is not None) is can.is_azimuth_continuous
+
+
+@benches
+def test_with_a_stow_it_goes_there_whatever_is_commanded_and_standby_leaves_it(bench: Bench) -> None:
+    table = Table(bench)
+    if not table.driver.capabilities.has_stow:
+        return
+    table.ask(THERE)
+    table.ask(SelectMode(AcuMode.REMOTE))
+    assert table.ask(Stow()) == Done()
+    assert table.status().mode in STOW_MODES
+    table.lead(THERE)
+    assert table.off_deg(THERE) > 1.0
+    assert table.status().mode in STOW_MODES
+    assert table.ask(SelectMode(AcuMode.STANDBY)) == Done()
+    assert table.status().mode is AcuMode.STANDBY
 
 
 @benches

@@ -14,7 +14,7 @@ from acu_daemon.control.orders import Orders
 from acu_daemon.control.safety.axis_watch import Bounds
 from acu_daemon.control.state import ControlState, Held, Sent
 from acu_daemon.control.tick import tick
-from acu_daemon.control.tick_input import Exchange, Observation, Sky, TickInput
+from acu_daemon.control.tick_input import Exchange, Observation, Sky, StowBy, TickInput
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.drivers.sa3842.field_status import contradictions
 from acu_daemon.drivers.sa3842.messages import Faults, Status
@@ -158,7 +158,7 @@ def outcome(situation: str, flag: str | None) -> tuple[object, ...]:
         hold_from_tai_s=NOW,
         in_force=(NOW - 0.1, 50.0, EL_DEG),
         has_locked=True,
-        is_stow_kept=track is TrackState.STOW,
+        stow_by=StowBy.PANEL if track is TrackState.STOW else StowBy.NOBODY,
         faults_read=(False,) * 4,
         again_tai_s=NOW - 2.0,
     )

@@ -3,7 +3,7 @@
 import pytest
 from fake_sky import Bench, Star
 
-from acu_daemon.acu.commands import AcuMode, Backup, Identify, Poll, ReadFaults, SelectBackup, SelectMode, Stop
+from acu_daemon.acu.commands import AcuMode, Backup, Identify, Poll, ReadFaults, SelectBackup, SelectMode, Stop, Stow
 from acu_daemon.drivers.sa3842.field_status import field_status
 from acu_daemon.drivers.sa3842.messages import (
     Ack,
@@ -18,7 +18,6 @@ from acu_daemon.drivers.sa3842.messages import (
     RegisterContents,
     ResetFault,
     Status,
-    Stow,
     WriteAndPoll,
     WriteParameter,
     WriteRegisters,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from acu_daemon.acu.commands import AcuMode, Backup, Identify, Poll, ReadFaults, SelectBackup, SelectMode, Stop
+from acu_daemon.acu.commands import AcuMode, Backup, Identify, Poll, ReadFaults, SelectBackup, SelectMode, Stop, Stow
 from acu_daemon.drivers.sa3842.codec import (
     CommandDecoder,
     CommandEvent,
@@ -31,7 +31,6 @@ from acu_daemon.drivers.sa3842.messages import (
     Reply,
     ResetFault,
     Status,
-    Stow,
     WriteAndPoll,
     WriteParameter,
     WriteRegisters,

@@ -20,9 +20,9 @@ from hypothesis import strategies as st
 from memories import Judge
 from promise_rig import Rig, demo_scene
 
-from acu_daemon.acu.commands import AcuMode, Backup, SelectBackup, SelectMode
+from acu_daemon.acu.commands import AcuMode, Backup, SelectBackup, SelectMode, Stow
 from acu_daemon.drivers.sa3842.field_status import contradictions, field_status
-from acu_daemon.drivers.sa3842.messages import Command, Status, Stow
+from acu_daemon.drivers.sa3842.messages import Command, Status
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.scenario import AcuChoice, Scenario

@@ -30,7 +30,7 @@ from acu_daemon.control.registers import REFUSED_PAUSE_S
 from acu_daemon.control.safety.command_permit import permit
 from acu_daemon.control.state import ControlState, Lag, StartStage
 from acu_daemon.control.tick import tick
-from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Sky, TickInput
+from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Sky, StowBy, TickInput
 from acu_daemon.control.tracking.lag import LagEstimate
 from acu_daemon.control.tracking.state_table import ACTIVE, TrackState
 from acu_daemon.drivers.sa3842.angles import LSB_DEG
@@ -321,8 +321,9 @@ def test_a_fault_detail_is_asked_for_until_it_is_answered_and_again_when_the_bit
 @pytest.mark.parametrize("track", sorted(ACTIVE))
 def test_a_stow_from_elsewhere_ends_every_active_state_and_nothing_leaves_it(track: TrackState) -> None:
     stowing = status(AcuMode.STOWING, is_autotrack_selected=False)
-    state, orders = step(track, stowing)
-    assert state.tracking.track is TrackState.STOW
+    before = ready(track, status(AcuMode.REMOTE, is_autotrack_selected=False))
+    state, orders = tick(before, TickInput(saw(stowing), SKY, NOW), CONFIG)
+    assert (state.tracking.track, state.stow.stow_by) == (TrackState.STOW, StowBy.PANEL)
     assert orders.extra is None
     stowed = replace(stowing, mode=AcuMode.STOWED)
     for k in range(20):

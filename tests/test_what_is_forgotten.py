@@ -28,7 +28,7 @@ from acu_daemon.control.safety.encoder_watch import EncoderWatch
 from acu_daemon.control.safety.turn import Phase, TurnWatch
 from acu_daemon.control.state import ControlState, Held, Lag, PathOffset, Scan, Sent, StartStage, Watchdog
 from acu_daemon.control.tick import tick
-from acu_daemon.control.tick_input import Exchange, Observation, Request, Sky, TickInput
+from acu_daemon.control.tick_input import Exchange, Observation, Request, Sky, StowBy, TickInput
 from acu_daemon.control.tracking.lag import LagEstimate
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.model import Model, Reading
@@ -251,16 +251,16 @@ OCCASIONS = {
     ),
     "the ACU stows": Occasion(
         f"arming.is_stop_due foreign_stop.held {NOT_FOLLOWED} {TURN}",
-        {"intake.is_stow_kept": True, **goes_to(TrackState.STOW)},
+        {"stow.stow_by": StowBy.PANEL, **goes_to(TrackState.STOW)},
         before={"is_stop_due": True, "turn": STOPPING},
         seen=saw(STOWING),
     ),
     "the stow is left": Occasion(
-        f"intake.is_stow_kept {NOT_FOLLOWED}",
+        f"stow.stow_by {NOT_FOLLOWED}",
         goes_to(TrackState.IDLE),
         track=TrackState.STOW,
         was=status(AcuMode.STOWED),
-        before={"is_stow_kept": True, "held": None},
+        before={"stow_by": StowBy.PANEL, "held": None},
         seen=saw(IN_STANDBY),
     ),
     "a fault is gone": Occasion(

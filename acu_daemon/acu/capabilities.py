@@ -15,6 +15,7 @@ class Capabilities:
     has_sector_bit: bool = True  # one bit for the half of a range wider than a turn
     has_turn_choice: bool = True  # a parameter decides on which of two turns a bearing is followed
     has_register_watchdog: bool = True  # it stops the antenna when no angles are commanded for a while
+    has_stow: bool = True  # it has a stow position of its own, and goes there when it is told
     has_read_back: bool = True  # the commanded angles can be read
     has_combined_write: bool = True  # angles are commanded and the status asked in one exchange
     is_azimuth_continuous: bool = False  # it counts the turns of the cable; else it shows a bearing

@@ -82,6 +82,11 @@ class Stop:
 
 
 @dataclass(frozen=True, slots=True)
+class Stow:
+    """Drive to the stow position, straight, and stay there."""
+
+
+@dataclass(frozen=True, slots=True)
 class ReadFaults:
     """Ask what a fault is."""
 
@@ -117,12 +122,14 @@ Command = (
     | SelectMode
     | SelectBackup
     | Stop
+    | Stow
     | ReadFaults
     | ReadTurnChoice
     | FreeTurnChoice
     | ReadWatchdog
     | SetWatchdog
 )
+STOW_MODES = (AcuMode.STOWING, AcuMode.STOWED)
 READS = (Identify, Poll, ReadCommanded, ReadFaults, ReadTurnChoice, ReadWatchdog)  # they change nothing
 
 

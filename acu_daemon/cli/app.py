@@ -47,6 +47,8 @@ COMMANDS = {  # name: module of acu_daemon.cli, and the function in it
     "arm": ("operator_commands", "arm"),
     "disarm": ("operator_commands", "disarm"),
     "clear": ("operator_commands", "clear"),
+    "stow": ("operator_commands", "stow"),
+    "unstow": ("operator_commands", "unstow"),
     "reload": ("operator_commands", "reload"),
     "status": ("operator_commands", "status"),
     "wait": ("wait", "command"),

@@ -16,11 +16,15 @@ from acu_daemon.config.load import load_station
 from acu_daemon.config.station_tables import StationFile
 from acu_daemon.daemon.health import status_line
 from acu_daemon.daemon.verdict import Level, alarms, verdict
-from acu_daemon.edge.latch import ADVICE, DISARMED, LATCH
+from acu_daemon.edge.latch import ADVICE, DISARMED, LATCH, STOWED
 from acu_daemon.edge.state_directory import SNAPSHOT, choice_text, folders_in, older_folders, state_path, with_choice
 from acu_daemon.errors import UsageError
 
 HEALTHY_AGE_S = 5.0
+ALARM_KEYS = (  # of a snapshot
+    *("clock_alarm", "encoder_problem", "files_alarm", "turn_alarm"),
+    *("limit_alarm", "line_alarm", "stow_alarm"),
+)
 
 
 def held_finding(daemon: OwnDaemon) -> Finding:
@@ -37,7 +41,7 @@ def left_behind(config: Path, station: StationFile, state: Path | None) -> Itera
     """What of the last run forbids the next one to move."""
     directory, antenna = state_path(state, is_rehearsal=False), antenna_of(station)
     advice = {name: with_choice(text, choice_text(config, state, is_rehearsal=False)) for name, text in ADVICE.items()}
-    for grade, name in ((NO_GO, LATCH), (WARN, DISARMED)):
+    for grade, name in ((NO_GO, LATCH), (WARN, DISARMED), (WARN, STOWED)):
         for folder in (antenna.folder(directory), *older_folders(directory, antenna)):
             if os.access(folder / name, os.F_OK):  # one that is not ours to look into says nothing
                 yield Finding(grade, name, f"{folder / name} is there: {advice[name]}")
@@ -75,8 +79,7 @@ def _alarms(snapshot: Path) -> list[str]:
     try:
         seen = json.loads(snapshot.read_text(encoding="utf-8"))
         latch, disarmed_by = seen.get("latch", ""), seen.get("disarmed_by", "")
-        names = ("clock_alarm", "encoder_problem", "files_alarm", "turn_alarm", "limit_alarm", "line_alarm")
-        others = [seen.get(name, "") for name in names]
+        others = [seen.get(name, "") for name in ALARM_KEYS]
     except (OSError, ValueError, AttributeError):
         return []
     texts = [latch and f"latched: {latch}", disarmed_by and f"disarmed by {disarmed_by}", *others]

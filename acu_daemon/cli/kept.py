@@ -22,9 +22,10 @@ from acu_daemon.assist.mount_memory.pedestal_memory import PedestalMemory
 from acu_daemon.cli.options import Target
 from acu_daemon.config.to_settings import estimator_settings, pedestal_text
 from acu_daemon.control.state import ControlState, Held, remembered
+from acu_daemon.control.tick_input import StowBy
 from acu_daemon.edge.carry_over_file import FitKeeper, carry_over_path, read_carry_over
 from acu_daemon.edge.clock import Clock
-from acu_daemon.edge.latch import DISARMED, LATCH, LatchKeeper, read_latch
+from acu_daemon.edge.latch import DISARMED, LATCH, STOWED, LatchKeeper, read_latch
 from acu_daemon.edge.mount_memory_file import MOUNT, MountKeeper, mount_files, open_mount_file
 from acu_daemon.edge.run_state import RUN_STATE, RunState, RunStateKeeper, read_run_state
 from acu_daemon.edge.writer import Writer
@@ -33,12 +34,12 @@ from acu_daemon.model import FitResult, Pass
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """What was left, and the five that keep what this run leaves.
+    """What was left, and the six that keep what this run leaves.
 
     carried: the fit of this pass, where the daemon is started again in it, else what the last pass left.
     memory: what the station knows of its antenna, from passes of any satellite.
-    state: what the decision begins with.  A latch and a disarm stay until a person ends them, whatever the pass; what a
-    person armed is armed for one pass.
+    state: what the decision begins with.  A latch, a disarm and a stow stay until they are ended, whatever the pass;
+    what a person armed is armed for one pass.
     """
 
     carried: CarryOver | None
@@ -49,6 +50,7 @@ class Kept:
     run_state: RunStateKeeper
     latches: LatchKeeper
     disarms: LatchKeeper
+    stows: LatchKeeper
 
     def offer(self, fit: FitResult) -> None:
         """Take an accepted fit."""
@@ -59,12 +61,13 @@ class Kept:
         """Take the memory of a tick."""
         self.latches.see(state.latch.problem)
         self.disarms.see(state.arming.disarmed_by)
+        self.stows.see(str(state.stow.stow_by))
         self.run_state.see(state)
 
     @property
     def problem(self) -> str:
         """What of it cannot be written now, and why; "": all is."""
-        keepers = (self.run_state, self.carry_over, self.mount, self.latches, self.disarms)
+        keepers = (self.run_state, self.carry_over, self.mount, self.latches, self.disarms, self.stows)
         return "; ".join(keeper.problem for keeper in keepers if keeper.problem)
 
     def flush(self) -> None:
@@ -88,12 +91,15 @@ def open_kept(
     clock_s = now_tai_s - clock.monotonic_s() if clock.is_rehearsal else None
     left = read_run_state(_first_with(RUN_STATE, directory, older))
     is_another = left.is_of_another_rehearsal(clock_s)
-    latch, disarmed_by = ("" if is_another else read_latch(directory, name, older) for name in (LATCH, DISARMED))
+    latch, disarmed_by, stowed = (
+        "" if is_another else read_latch(directory, name, older) for name in (LATCH, DISARMED, STOWED)
+    )
+    stow_by = _stow_by(stowed, left)
     is_same_pass = coming is not None and left.is_of(target.elements.label, coming, clock_s)
     if coming is None and not is_another:
-        state = _first_state(RunState(held=left.held, is_stow_kept=left.is_stow_kept), latch, disarmed_by)
+        state = _first_state(RunState(held=left.held), latch, disarmed_by, stow_by)
     else:
-        state = _first_state(left if is_same_pass else RunState(), latch, disarmed_by)
+        state = _first_state(left if is_same_pass else RunState(), latch, disarmed_by, stow_by)
     resumed = _resumed(left, target, now_tai_s) if is_same_pass else None
     path = carry_over_path(directory, target.satellite.satellite.norad_id, target.satellite.satellite.name)
     from_path = _first_with(path.name, directory, older) / path.name
@@ -124,6 +130,7 @@ def open_kept(
         run_state=RunStateKeeper(directory, files, first, partial(resume_of, source=source, site=site)),
         latches=LatchKeeper(directory, files, latch, clock, LATCH, older, is_left_out=is_another),
         disarms=LatchKeeper(directory, files, disarmed_by, clock, DISARMED, older, is_left_out=is_another),
+        stows=LatchKeeper(directory, files, stowed, clock, STOWED, older, is_left_out=is_another),
     )
 
 
@@ -132,7 +139,14 @@ def _first_with(name: str, directory: Path, older: Sequence[Path]) -> Path:
     return next((one for one in (directory, *older) if os.path.lexists(one / name)), directory)
 
 
-def _first_state(left: RunState, latch: str, disarmed_by: str) -> ControlState:
+def _stow_by(stowed: str, left: RunState) -> StowBy:
+    """Whose stow the file tells; one that cannot be read counts as a person's."""
+    if not stowed:
+        return StowBy.PANEL if left.is_stow_kept else StowBy.NOBODY
+    return StowBy(stowed) if stowed in set(StowBy) else StowBy.OPERATOR
+
+
+def _first_state(left: RunState, latch: str, disarmed_by: str, stow_by: StowBy) -> ControlState:
     """What the decision begins with; left: of this pass."""
     is_disarmed = bool(disarmed_by) or left.arming is False
     return remembered(
@@ -141,7 +155,7 @@ def _first_state(left: RunState, latch: str, disarmed_by: str) -> ControlState:
         is_stop_due=left.held is not None if is_disarmed else bool(latch),  # disarmed it is held until STOP
         latch=latch,
         held=None if left.held is None else Held(left.held),
-        is_stow_kept=left.is_stow_kept,
+        stow_by=stow_by,
     )
 
 

@@ -1,4 +1,4 @@
-"""`acu-daemon arm`, `disarm`, `clear`, `status`: a person's word to the running daemon, over its control socket."""
+"""`acu-daemon arm`, `disarm`, `clear`, `stow`, `unstow`, `reload`, `status`: a word to the running daemon."""
 
 from pathlib import Path
 from typing import Annotated
@@ -63,6 +63,28 @@ def clear(config: Config = None, state: State = None, rehearsal: Rehearsal = Fal
     Exit status: 0 cleared, or nothing was latched; 1 no daemon or no permission.
     """
     _say("clear", config, state, is_rehearsal=rehearsal)
+
+
+def stow(config: Config = None, state: State = None, rehearsal: Rehearsal = False) -> None:
+    """Send the antenna to the ACU's stow position, and keep it there until `acu-daemon unstow`.
+
+    Nothing is tracked meanwhile; it holds through restarts and for later passes.  A stow by the wind or between passes
+    becomes a person's by it.  Refused while disarmed, under the local panel, with an interlock open or a latched axis,
+    and where the straight way leads through a keep-out.
+
+    Exit status: 0 asked; 1 refused, no daemon or no permission.
+    """
+    _say("stow", config, state, is_rehearsal=rehearsal)
+
+
+def unstow(config: Config = None, state: State = None, rehearsal: Rehearsal = False) -> None:
+    """End a stow, whoever's it is.  The antenna stands where it is until a pass is near; then it leaves the stow.
+
+    Refused while the wind is strong: then the stow ends by itself once it is calm.
+
+    Exit status: 0; 1 refused, no daemon or no permission.
+    """
+    _say("unstow", config, state, is_rehearsal=rehearsal)
 
 
 def reload(config: Config = None, state: State = None, rehearsal: Rehearsal = False) -> None:

@@ -17,14 +17,17 @@ from acu_daemon.assist.session.refit import RefitReply, RefitRequest
 from acu_daemon.cli.kept import Kept, open_kept
 from acu_daemon.cli.options import Target, load_target
 from acu_daemon.cli.run_setup import make_job
-from acu_daemon.cli.station_day import MOVE_S, Beside, StationDay, move_to
+from acu_daemon.cli.station_day import MOVE_S, StationDay, move_to
+from acu_daemon.cli.station_wind import Beside
 from acu_daemon.cli.weather_watch import WeatherWatch
 from acu_daemon.config.load import satellite_names
+from acu_daemon.control.safety.stow import end_between_passes
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tracking.approach import Way, way_s
 from acu_daemon.daemon.background import fit_deadline_s
 from acu_daemon.daemon.health import Health
 from acu_daemon.daemon.live import LiveLine
+from acu_daemon.daemon.operator_requests import tell
 from acu_daemon.daemon.service import Outcome, PassJob, Service
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.daemon.stopping import DEADLINE_S
@@ -44,7 +47,6 @@ from acu_daemon.errors import AcuDaemonError, UsageError
 from acu_daemon.model import Pass
 from acu_daemon.schedule.book import Entry
 
-RELOAD = "reload"
 IN_PLACE_DEG = 0.1
 
 
@@ -113,6 +115,7 @@ class StationRuns:
         self._kept: Kept | None = None
         self._memory: ControlState | None = None
         self._stop_reason = ""
+        self._is_resting = False
         self._is_placed = True  # where it waits after a pass
         self._move_until_tai_s = math.inf
         self._warned_tai_s: float | None = None  # when the horn for the move to come began
@@ -124,11 +127,16 @@ class StationRuns:
         if self._service is not None:
             self._service.stop(reason)
 
-    def answer(self, line: str) -> str:
-        """Answer a line of the control socket."""
-        if line == RELOAD:
-            return self.day.ask_reload()
-        return "error the station starts" if self._service is None else self._service.answer(line)
+    def answer(self, line: str, who: str = "") -> str:
+        """Answer a person's line (daemon.operator_verbs).  who: says it, and from where."""
+        if self._service is None:
+            return "error the station starts"
+        name = line.split(" ")[0]
+        if name == "reload":
+            return tell(line=line, who=who, answer=self.day.ask_reload())
+        if name == "unstow" and (why := self.day.why_not_unstow()):
+            return tell(line=line, who=who, answer=f"error {why}")
+        return self._service.answer(line, who)
 
     async def run(self) -> Outcome:
         """Run until it is stopped.  Raises: NoAcuError: no good poll at the start."""
@@ -204,7 +212,7 @@ class StationRuns:
         is_cut = entry.end_tai_s < coming.set_tai_s - 1.0
         job = replace(job, end_tai_s=min(job.end_tai_s, entry.end_tai_s)) if is_cut else job
         if self._memory is None:  # the first of this process: as one of a single pass is resumed
-            job = replace(job, state=self._kept.state, is_anew=False)
+            job = replace(job, state=end_between_passes(self._kept.state), is_anew=False)
         self._warned_tai_s = None
         self.day.begun(entry)
         self._is_placed = False
@@ -249,6 +257,7 @@ class StationRuns:
         state = job.state if self._memory is None else self._memory
         after_tai_s = setup.clock.tai_s() if coming is None else coming.rise_tai_s + 60.0
         shown = self.day.next_passes(after_tai_s)
+        state = state if is_resting else end_between_passes(state)
         return replace(job, control=control, state=state, is_anew=self._memory is not None, next_passes=shown)
 
     async def _serve(self, job: PassJob, runner: FitRunner, why_anew: Callable[[bool, float], str] | None) -> Outcome:
@@ -271,7 +280,7 @@ class StationRuns:
             elements_problem=lambda: self.day.fetching.problem,
             why_anew=why_anew,
         )
-        self._service = service
+        self._service, self._is_resting = service, job.control.is_resting
         if self._stop_reason:
             service.stop(self._stop_reason)
         outcome = await service.run()
@@ -295,6 +304,7 @@ class StationRuns:
         self._health.see(seen)
         self._snapshots.write(seen)
         self.day.see(seen)
+        self._obey_wind(seen)
         if self._live is not None:
             self._live.show(seen)
         if math.isfinite(self._move_until_tai_s) and self._service is not None:
@@ -303,6 +313,16 @@ class StationRuns:
             elif seen.tai_s > self._move_until_tai_s:
                 self._log.warning("station.not_in_place", state=seen.state, arming=seen.arming)
                 self._service.stop("not in place")
+
+    def _obey_wind(self, seen: Snapshot) -> None:
+        """The antenna is stowed for the wind; one that stands is not moved before the horn was heard."""
+        wish = self.day.wind.look(seen.tai_s, self.day.stow_by)
+        if wish is None or self._service is None:
+            return
+        if wish.is_wanted and self._is_resting and not self._is_warned({"reason": self.day.wind.seen.words}):
+            return
+        self._warned_tai_s = None
+        self._service.ask(wish)
 
     def _is_in_place(self, seen: Snapshot) -> bool:
         is_still = seen.speed_deg_s is not None and seen.speed_deg_s < STILL_DEG_S
@@ -335,7 +355,7 @@ async def run_station(setup: StationSetup, clock: SystemClock, first: Target, li
         loop.add_signal_handler(signal.SIGHUP, runs.day.ask_reload)
     control = ControlSocket(setup.directory, runs.answer)
     await control.open()
-    await runs.day.wind_reader.open()
+    await runs.day.wind.open()
     sync = asyncio.create_task(clock.watch_synchronisation())
     try:
         await runs.day.first_plan()

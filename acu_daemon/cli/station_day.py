@@ -9,7 +9,7 @@
 import asyncio
 import contextlib
 import math
-from collections.abc import Callable, Collection, Coroutine
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,9 +22,10 @@ from acu_daemon.cli.elements_watch import keep_confirmed
 from acu_daemon.cli.options import Target, coming_pass, load_target, longest_lead
 from acu_daemon.cli.run_setup import SHOWN_COUNT, next_text
 from acu_daemon.cli.schedule_plan import StationPlan, station_plan
+from acu_daemon.cli.station_wind import Beside, StationWind
 from acu_daemon.config.load import load_station
 from acu_daemon.config.station_tables import StationFile
-from acu_daemon.control.tick_input import PassPlan
+from acu_daemon.control.tick_input import PassPlan, StowBy
 from acu_daemon.daemon.service import Outcome
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.daemon.verdict import alarms
@@ -33,14 +34,12 @@ from acu_daemon.edge.elements_choice import ElementsSources
 from acu_daemon.edge.elements_fetching import ElementsFetching
 from acu_daemon.edge.hooks import Hook, Hooks
 from acu_daemon.edge.schedule_file import ScheduleFile, Words
-from acu_daemon.edge.wind_reader import WindReader
 from acu_daemon.errors import AcuDaemonError
 from acu_daemon.model import Pass
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.schedule.book import UNDER_WAY, Entry, PassState, merged
 from acu_daemon.schedule.exact_plan import Slot
 from acu_daemon.schedule.rules import PassRequest, Wish
-from acu_daemon.schedule.wind import Wind, WindWatch, watch
 from acu_daemon.units import DAY_S
 
 PLAN_S = 600.0  # from plan to plan where nothing has changed
@@ -48,7 +47,6 @@ FILES_S = 5.0  # from look to look at the files
 CHECKS_S = (300.0, 60.0)  # before the rise
 AGAIN_S = 15.0  # a no-go is tried again
 DEGRADED_SHARE = 0.5  # of the useful seconds with the signal
-Beside = Callable[..., Coroutine[Any, Any, Any]]
 SPARE_S = 5.0  # for the start of a pass' run
 MOVE_S = 60.0  # so much longer than reckoned a move may take
 RESUMED = "gone on with after a restart"
@@ -105,15 +103,20 @@ class StationDay:
         self._alarms: frozenset[str] = frozenset()
         self._log: Any = structlog.get_logger("station")
         self.hooks = Hooks(station.hooks.commands, station.hooks.time_limit_s)
-        self.wind_reader = WindReader(
-            station.wind.udp, None if station.wind.file is None else config / station.wind.file
-        )
-        self.wind = WindWatch()
+        self.wind = StationWind(station.wind, config, beside)
+        self.stow_by = StowBy.NOBODY
         self.fetching = ElementsFetching(config, station.elements, clock, is_rehearsal=is_rehearsal)
         self.entry: Entry | None = None  # the pass that is on
         self.reload_reason = "the start"
 
     # Plan
+
+    def why_not_unstow(self) -> str:
+        """Why a person may not end the stow now; empty: it is ended."""
+        if why := self.wind.why_not_unstow(self.stow_by):
+            return why
+        self.wind.let_go()
+        return ""
 
     def ask_reload(self) -> str:
         """Have files and elements read again, between passes."""
@@ -170,20 +173,10 @@ class StationDay:
         """Look, once a second between passes, at all that may change; why the rest ends, empty: it does not."""
         now_tai_s = self._clock.tai_s()
         self.fetching.look()
-        self._look_at_wind(now_tai_s)
         self._look_at_words()
         self._look_at_files(now_tai_s)
         self._go_on_planning(now_tai_s)
         return self._due(now_tai_s)
-
-    def _look_at_wind(self, now_tai_s: float) -> None:
-        if not self.station.wind.is_watched:
-            return
-        before = self.wind
-        self.wind = watch(before, self.wind_reader.now(now_tai_s), self.station.wind.rules(), now_tai_s)
-        if (before.wind, before.wants_stow) != (self.wind.wind, self.wind.wants_stow):
-            tell = self._log.info if self.wind.wind is Wind.CALM else self._log.warning
-            tell("wind.changed", wind=self.wind.words)
 
     def _look_at_words(self) -> None:
         words = self._file.words()
@@ -217,6 +210,7 @@ class StationDay:
         if self.reload_reason:
             try:
                 self.station = load_station(self._config)
+                self.wind.section = self.station.wind
             except AcuDaemonError as error:
                 self._log.error("config.kept", reason=str(error), in_force="what was read before")
                 self.reload_reason, self._planned_tai_s = "", now_tai_s
@@ -245,8 +239,10 @@ class StationDay:
         self._check(entry, before_s, now_tai_s)
         if before_s > self._lead_s(entry) or self._checking is not None or now_tai_s < self._again_tai_s:
             return ""
-        if self.wind.wants_stow:
-            return self._refuse(entry, now_tai_s, self.wind.words)
+        if self.wind.seen.wants_stow:
+            return self._refuse(entry, now_tai_s, self.wind.seen.words)
+        if self.stow_by not in (StowBy.NOBODY, StowBy.SCHEDULE):
+            return self._refuse(entry, now_tai_s, f"stowed by the {self.stow_by}")
         if self._no_go:
             return self._refuse(entry, now_tai_s, self._no_go)
         return f"{entry.name} begins"
@@ -328,6 +324,9 @@ class StationDay:
 
     def see(self, seen: Snapshot) -> None:
         """Take the newest snapshot, of a pass or between passes."""
+        self.stow_by = StowBy(seen.stow_by)
+        if self.entry is not None and seen.stow_by:
+            self._tracked.words = f"stowed by the {seen.stow_by}"
         new_alarms = frozenset(alarms(seen)) - self._alarms
         self._alarms = frozenset(alarms(seen))
         if new_alarms:
@@ -375,11 +374,10 @@ class StationDay:
             share = locked_s / entry.useful_s
         if not outcome.has_acquired and locked_s == 0.0:
             cause = "; ".join(sorted(self._alarms)) or "no signal: the satellite was silent, or not where it should be"
-            return PassState.FAILED, f"never acquired: {cause}"
+            return PassState.FAILED, f"never acquired: {self._tracked.words or cause}"
         said = f"signal for {locked_s:.0f} of {entry.useful_s:.0f} useful seconds"
-        if share < DEGRADED_SHARE:
-            return PassState.DEGRADED, said
-        return PassState.DONE, "; ".join(text for text in (said, self._tracked.words) if text)
+        state = PassState.DEGRADED if share < DEGRADED_SHARE else PassState.DONE
+        return state, "; ".join(text for text in (said, self._tracked.words) if text)
 
     def _judged_by_path(self, entry: Entry) -> tuple[PassState, str]:
         """Of a station that is told of no signal: whether the antenna was where the satellite should be."""
@@ -423,7 +421,7 @@ class StationDay:
         self.hooks.end_during()
         await self.hooks.close()
         await self.fetching.close()
-        self.wind_reader.close()
+        self.wind.close()
         for task in (self._planning, self._checking):
             if task is not None:
                 task.cancel()

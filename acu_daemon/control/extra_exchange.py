@@ -10,6 +10,7 @@ from acu_daemon.acu.replies import Refused
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.arming import last_command
 from acu_daemon.control.safety.interlock import question
+from acu_daemon.control.safety.stow import stow_command
 from acu_daemon.control.startup import next_command
 from acu_daemon.control.state import ControlState, StartStage
 from acu_daemon.control.tick_input import Exchange
@@ -30,7 +31,7 @@ def wanted_extra(state: ControlState, now_tai_s: float, config: ControlConfig) -
     wanted = last_command(state, config)
     if wanted is None and now_tai_s - reading.tai_s > config.acu.silence_s:
         return None  # a status from before an outage: who knows where the antenna is now
-    wanted = wanted or question(state) or next_command(state, config)
+    wanted = wanted or question(state) or stow_command(state, now_tai_s, config) or next_command(state, config)
     may_select = state.is_armed(config) and not state.turn.is_stopping
     if wanted is None and may_select and _are_registers_fresh(state, now_tai_s, config):
         wanted = wanted_mode_command(state, config, is_settled=now_tai_s - asked.again_tai_s > EXTRA_SETTLED_S)

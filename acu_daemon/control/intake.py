@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-from acu_daemon.acu.commands import AcuMode
 from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.control.orders import Event
 from acu_daemon.control.safety.encoder_watch import EncoderWatch, watch_encoders
@@ -27,19 +26,9 @@ def take_status(
         is_place_sure=given.seen.is_confirmed,
         az_deg=az_deg,
         track_of_readings=(*before.track_of_readings[1 - RATE_READINGS :], (reading.tai_s, az_deg, status.el_deg)),
-        is_stow_kept=_is_stow_kept(state, status),
     )
     encoders = _watched(state, status, reading, given.sky, events) if given.seen.is_in_step else state.encoders
     return with_parts(state, intake=intake, encoders=encoders)
-
-
-def _is_stow_kept(state: ControlState, status: AcuStatus) -> bool:
-    """A stow that began after the start is somebody's wish; an antenna found stowed at the start is ours to take."""
-    before = state.intake
-    if status.mode is AcuMode.STOWED:
-        was_elsewhere = before.status is not None and before.status.mode is not AcuMode.STOWED
-        return before.is_stow_kept or was_elsewhere or state.foreign_stop.held is not None
-    return status.mode is AcuMode.STOWING
 
 
 def shift_places(state: ControlState, shift_deg: float) -> ControlState:

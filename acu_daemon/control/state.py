@@ -17,6 +17,7 @@ from acu_daemon.control.safety.axis_watch import AxesWatch
 from acu_daemon.control.safety.encoder_watch import EncoderWatch
 from acu_daemon.control.safety.status_plausibility import Plausibility
 from acu_daemon.control.safety.turn import TurnWatch
+from acu_daemon.control.tick_input import StowBy
 from acu_daemon.control.tracking.lag import LagEstimate
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.model import Model, Reading
@@ -51,7 +52,6 @@ class Intake:
     is_place_sure: bool = False  # the newest statuses agree where the antenna is
     az_deg: float = 0.0  # encoder azimuth of the newest status, in the frame of the wrap (continuous)
     track_of_readings: tuple[tuple[float, float, float], ...] = ()  # the newest: time, continuous azimuth, elevation
-    is_stow_kept: bool = False  # somebody stowed the antenna while we looked on: it stays, also after a lost link
 
     @property
     def el_deg(self) -> float:
@@ -106,10 +106,18 @@ class ForeignStop:
 
 
 @dataclass(frozen=True, slots=True)
+class Stowing:
+    """Whose stow keeps the antenna from moving, also after a lost link.  Owner: control.safety.stow."""
+
+    stow_by: StowBy = StowBy.NOBODY
+
+
+@dataclass(frozen=True, slots=True)
 class Interlock:
     """What the ACU was asked of its faults.  Owner: control.safety.interlock."""
 
-    faults_read: tuple[bool, ...] | None = None  # the fault bits of the status whose detail was read, while in FAULT
+    faults_read: tuple[bool, ...] | None = None  # the fault bits of the status whose detail was read
+    is_watchdog_alone: bool = False  # the detail names no fault but a register watchdog that had tripped
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,6 +258,7 @@ class ControlState:
     startup: Startup = Startup()
     arming: Arming = Arming()
     foreign_stop: ForeignStop = ForeignStop()
+    stow: Stowing = Stowing()
     interlock: Interlock = Interlock()
     latch: Latch = Latch()
     turn: TurnWatch = TurnWatch()  # owner: control.safety.turn_doubt
@@ -285,12 +294,12 @@ def remembered(
     is_stop_due: bool,
     latch: str,
     held: Held | None,
-    is_stow_kept: bool,
+    stow_by: StowBy,
 ) -> ControlState:
     """The memory that a run begins with: what people and the antenna have told the one before it."""
     return ControlState(
-        intake=Intake(is_stow_kept=is_stow_kept),
         arming=Arming(by_people, disarmed_by, is_stop_due),
         foreign_stop=ForeignStop(held),
+        stow=Stowing(stow_by),
         latch=Latch(latch),
     )

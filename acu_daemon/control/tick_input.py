@@ -19,6 +19,30 @@ class Request(StrEnum):
     CLEAR = "clear"
 
 
+class StowBy(StrEnum):
+    """Whose a stow is.  Who comes later in this list takes one over from those before, who then may not end it."""
+
+    NOBODY = ""
+    SCHEDULE = "schedule"  # between passes; the next pass ends it
+    WIND = "wind"  # the wind ends it, once it is calm
+    PANEL = "panel"  # or another hand at the ACU: whoever stowed it, or a person's word
+    OPERATOR = "operator"  # a person's word alone
+
+
+STOWED_BY_US = frozenset({StowBy.SCHEDULE, StowBy.WIND, StowBy.OPERATOR})  # STOW is this daemon's to send
+
+
+@dataclass(frozen=True, slots=True)
+class StowWish:
+    """Stow the antenna, or stow it no more.  by OPERATOR, a stow of anybody is ended."""
+
+    by: StowBy
+    is_wanted: bool = True
+
+
+Asking = Request | StowWish
+
+
 @dataclass(frozen=True, slots=True)
 class Exchange:
     """An extra exchange that was tried, and its reply; None when none came in time."""
@@ -55,7 +79,7 @@ class Observation:
     must_poll: bool = (
         False  # the last exchange failed: the next command is a poll (docs/adding-an-acu.md, Late replies)
     )
-    requests: tuple[Request, ...] = ()
+    requests: tuple[Asking, ...] = ()
     has_room: bool = True  # the cycle leaves room for an exchange beside the write (docs/adding-an-acu.md, Timing)
 
 

@@ -16,6 +16,7 @@ from acu_daemon.acu.commands import (
     SelectBackup,
     SelectMode,
     SetWatchdog,
+    Stow,
     command_text,
 )
 from acu_daemon.acu.replies import AcuIdentity, AcuStatus, Done, FaultReport, Refused
@@ -25,9 +26,10 @@ from acu_daemon.control.orders import Event
 from acu_daemon.control.receiver_signal import SignalSample
 from acu_daemon.control.safety.arming import owes_stop
 from acu_daemon.control.safety.interlock import question
+from acu_daemon.control.safety.stow import stow_command
 from acu_daemon.control.state import StartStage, Watchdog
 from acu_daemon.control.tick import tick
-from acu_daemon.control.tick_input import Arrival, Observation, Request, TickInput
+from acu_daemon.control.tick_input import Arrival, Asking, Observation, TickInput
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.clock_watch import ClockWatch
 from acu_daemon.daemon.line_watch import LineWatch
@@ -45,6 +47,7 @@ HURRY_SHARE = 0.9  # of the period: the next tick comes on time
 LOOK_TICKS = 10  # from look to look at clock and line
 REST_S = 1.0  # from poll to poll between passes
 AWAKE_S = 2.0  # after a person's word or a reply that did not come it polls as in a pass for so long
+TOLD = (SelectMode, SelectBackup, FreeTurnChoice, SetWatchdog, PointAt, Stow)  # commands that the log tells
 BLIND_S = 1.0  # without a status other replies keep the link no longer than this: they say nothing of the antenna
 
 
@@ -72,7 +75,7 @@ class Foreground:
         self._signal = signal
         self._doubt_again_s = -math.inf
         self._seen = Observation()
-        self._requests: tuple[Request, ...] = ()
+        self._requests: tuple[Asking, ...] = ()
         self._connect_count = 0
         self._awake_until_s = -math.inf
         self._status_s = -math.inf  # when the newest status came, believed or not, or was refused
@@ -119,7 +122,8 @@ class Foreground:
         if not self._config.is_resting:
             return False
         is_known = self._seen.status is not None and state.startup.stage >= StartStage.REGISTERS_KNOWN
-        if not is_known or self._requests or state.arming.is_stop_due or question(state) is not None:
+        has_business = question(state) is not None or stow_command(state, self._clock.tai_s(), self._config) is not None
+        if not is_known or self._requests or state.arming.is_stop_due or has_business:
             self._awake_until_s = now_s + AWAKE_S
         return now_s >= self._awake_until_s
 
@@ -180,7 +184,7 @@ class Foreground:
             await port.idle_gap()
             await self._do(orders.extra)
 
-    def ask(self, request: Request) -> None:
+    def ask(self, request: Asking) -> None:
         """Take a person's request; the next tick obeys."""
         self._requests = (*self._requests, request)
 
@@ -260,9 +264,7 @@ class Foreground:
         elif isinstance(answer.reply, FaultReport):
             self.acu_faults = ", ".join(answer.reply.texts)
             self._log.warning("acu.faults", faults=answer.reply.texts)
-        elif isinstance(command, SelectMode | SelectBackup | FreeTurnChoice | SetWatchdog | PointAt) and isinstance(
-            answer.reply, Done
-        ):
+        elif isinstance(command, TOLD) and isinstance(answer.reply, Done):
             self._log.info("acu.command", command=command_text(command))
 
     @property

@@ -1,14 +1,25 @@
-"""A person's hand on the running daemon: what it answers to a line of the control socket."""
+"""A person's hand on the running daemon: what it answers to a line, and what it asks of the next tick by it.
+
+Command line, page and other programs' ports all come through `Hands.answer`; daemon.operator_verbs has the verbs.
+"""
 
 import json
 from collections.abc import Callable
 from dataclasses import asdict
+from typing import Any
+
+import structlog
 
 from acu_daemon.control.control_config import ControlConfig
-from acu_daemon.control.tick_input import Request
+from acu_daemon.control.safety.stow import why_not_sent
+from acu_daemon.control.tick_input import Asking, Request, StowBy, StowWish
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.daemon.area import CommonArea
+from acu_daemon.daemon.operator_verbs import Said, understood
 from acu_daemon.daemon.snapshot import Snapshot
+from acu_daemon.errors import UsageError
+
+STATUS = "status"
 
 
 class Hands:
@@ -18,26 +29,38 @@ class Hands:
         self,
         area: CommonArea,
         control: ControlConfig,
-        ask: Callable[[Request], None],
+        ask: Callable[[Asking], None],
         snapshot: Callable[[], Snapshot],
+        now_tai_s: Callable[[], float],
     ) -> None:
         self._area = area
         self._control = control
         self._ask = ask
         self._snapshot = snapshot
+        self._now_tai_s = now_tai_s
 
-    def answer(self, line: str) -> str:
-        """`ok ...` or `error ...`."""
-        if line == "status":
+    def answer(self, line: str, who: str = "") -> str:
+        """`ok ...` or `error ...`.  who: says it, and from where, for the log."""
+        if line == STATUS:
             return f"ok {json.dumps(asdict(self._snapshot()))}"
-        if line not in set(Request):
-            return f"error {line!r} is unknown, expected status, {', '.join(Request)}"
-        return self._request(Request(line))
+        try:
+            said = understood(line)
+        except UsageError as error:
+            return f"error {error}"
+        return self.do(said, who)
+
+    def do(self, said: Said, who: str) -> str:
+        """Do what was said."""
+        verb = said.verb
+        if verb.is_of_station:
+            return f"error {verb.name}: only a station has it, `acu-daemon run` without --satellite"
+        if self._control.is_shadow:
+            return f"error this daemon runs with --shadow: it commands nothing, so there is nothing to {verb.name}"
+        answer = self._stow(verb.name) if verb.name in ("stow", "unstow") else self._request(Request(verb.name))
+        return tell(line=verb.name, who=who, answer=answer)
 
     def _request(self, request: Request) -> str:
         state = self._area.state
-        if self._control.is_shadow:
-            return f"error this daemon runs with --shadow: it commands nothing, so there is nothing to {request}"
         if request is Request.CLEAR and not state.latch.problem:
             return "ok nothing is latched"
         self._ask(request)
@@ -50,3 +73,20 @@ class Hands:
             Request.DISARM: "ok disarmed: STOP is sent if the daemon moves the antenna, then nothing",
             Request.CLEAR: f"ok cleared: {state.latch.problem}",
         }[request]
+
+    def _stow(self, verb: str) -> str:
+        state, by = self._area.state, self._area.state.stow.stow_by
+        if verb == "unstow":
+            self._ask(StowWish(StowBy.OPERATOR, is_wanted=False))
+            return f"ok the stow is over, it was the {by}'s" if by else "ok nothing is stowed"
+        if why := why_not_sent(state, self._now_tai_s(), self._control):
+            return f"error not stowed: {why}"
+        self._ask(StowWish(StowBy.OPERATOR))
+        return "ok stowed: the ACU goes to its stow position; `acu-daemon unstow` ends it"
+
+
+def tell(*, line: str, who: str, answer: str) -> str:
+    """Write into the log what a person said, and return the answer to it."""
+    log: Any = structlog.get_logger("operator")
+    log.info("operator.asked", line=line, who=who, answer=answer)
+    return answer

@@ -64,7 +64,7 @@ _STEERS = {
     S.FALSE_LOCK: "the daemon, back from a false lock onto the path; then autotrack",
     S.AVOID: "the daemon, clear of a keep-out; then autotrack",
     S.MANUAL: "the local panel",
-    S.STOW: "the ACU, to or in the stow position",
+    S.STOW: "the ACU, to or in its stow position",
     S.FAULT: "nobody",
     S.LINK_LOST: "not known: no link",
 }

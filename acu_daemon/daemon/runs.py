@@ -27,9 +27,9 @@ class Runs:
         self._stop_reason = self._stop_reason or reason
         self._service.stop(reason)
 
-    def answer(self, line: str) -> str:
+    def answer(self, line: str, who: str = "") -> str:
         """Answer a line of the control socket."""
-        return self._service.answer(line)
+        return self._service.answer(line, who)
 
     async def run(self) -> Outcome:
         """Run until one has ended for good.  Raises what Service.run and `begin` raise."""

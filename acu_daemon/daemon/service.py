@@ -17,7 +17,7 @@ from acu_daemon.control.receiver_signal import SignalSample
 from acu_daemon.control.safety.arming import begin_run
 from acu_daemon.control.safety.foreign_stop import release
 from acu_daemon.control.state import ControlState, remembered
-from acu_daemon.control.tick_input import PassPlan
+from acu_daemon.control.tick_input import Asking, PassPlan
 from acu_daemon.control.tracking.approach import lead_s
 from acu_daemon.control.tracking.pass_plan import is_due, is_tracked, plan_pass, why_over
 from acu_daemon.control.tracking.state_table import ACTIVE
@@ -169,7 +169,7 @@ class Service:
             on_reading=on_reading,
             signal=None if self._signal is None else self._signal.now,
         )
-        self._hands = Hands(self._area, job.control, self._foreground.ask, self.snapshot)
+        self._hands = Hands(self._area, job.control, self._foreground.ask, self.snapshot, clock.tai_s)
 
     def stop(self, reason: str) -> None:
         """End the run after the present tick, or the next one: no exchange is cut off.  Safe stop included."""
@@ -261,7 +261,7 @@ class Service:
             is_stop_due=state.arming.is_stop_due,
             latch=state.latch.problem,
             held=state.foreign_stop.held,
-            is_stow_kept=state.intake.is_stow_kept,
+            stow_by=state.stow.stow_by,
         )
 
     def _check_acu(self, elapsed_s: float) -> None:
@@ -362,9 +362,13 @@ class Service:
             files_alarm=self._files_alarm(),
         )
 
-    def answer(self, line: str) -> str:
-        """Answer a line of the control socket."""
-        return self._hands.answer(line)
+    def answer(self, line: str, who: str = "") -> str:
+        """Answer a person's line (daemon.operator_verbs).  who: says it, and from where."""
+        return self._hands.answer(line, who)
+
+    def ask(self, asking: Asking) -> None:
+        """Have the next tick do what the station wants, or a person."""
+        self._foreground.ask(asking)
 
     def _outcome(self, reason: str, is_stopped: bool) -> Outcome:
         state, foreground = self._area.state, self._foreground

@@ -63,6 +63,8 @@ class Snapshot:
     arming: str = "armed"  # "disarmed", "shadow"
     disarmed_by: str = ""
     latch: str = ""  # what an axis did wrong; cleared by a person
+    stow_by: str = ""  # whose the stow is that keeps the antenna: wind, operator, panel, schedule
+    stow_alarm: str = ""  # that a stow is wanted, and why it is not carried out
     encoder_problem: str = ""
     clock_alarm: str = ""
     line_alarm: str = ""

@@ -4,9 +4,11 @@ from dataclasses import replace
 from math import isfinite
 from typing import Any
 
+from acu_daemon.acu.commands import STOW_MODES
 from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.safety.stow import why_not_sent
 from acu_daemon.control.state import ControlState
-from acu_daemon.control.tick_input import Sky
+from acu_daemon.control.tick_input import STOWED_BY_US, Sky, StowBy
 from acu_daemon.control.tracking.hills import hidden_until_tai_s, is_hidden
 from acu_daemon.control.tracking.off_path import off_path
 from acu_daemon.control.tracking.path_offset import is_heard_beside
@@ -22,6 +24,11 @@ from acu_daemon.model import Prediction, Reading, sky_angle_deg
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.pointing.reach import zenith_text
 
+WANTS_STOW = {
+    StowBy.SCHEDULE: "the schedule says so",
+    StowBy.WIND: "the wind is strong",
+    StowBy.OPERATOR: "a person said so",
+}
 LATENESS_TICKS = 100  # the newest ten seconds
 
 
@@ -132,6 +139,8 @@ def _seen(
         arming=_arming(state, control),
         disarmed_by=state.arming.disarmed_by,
         latch=state.latch.problem,
+        stow_by=str(state.stow.stow_by),
+        stow_alarm=_stow_alarm(state, now_tai_s, control),
         clock_alarm=foreground.clock_watch.alarm,
         line_alarm=foreground.line_watch.alarm,
         files_alarm=files_alarm,
@@ -151,6 +160,15 @@ def _zenith(sky: Sky, now_tai_s: float) -> str:
     crossing = sky.prediction.crossing if sky.prediction is not None else None
     crossing = crossing or (sky.plan.crossing if sky.plan is not None else None)
     return zenith_text(crossing) if crossing is not None and now_tai_s < crossing.return_tai_s else ""
+
+
+def _stow_alarm(state: ControlState, now_tai_s: float, control: ControlConfig) -> str:
+    """Of a stow of ours that the status does not show."""
+    by, status = state.stow.stow_by, state.intake.status
+    if by not in STOWED_BY_US or (status is not None and status.mode in STOW_MODES):
+        return ""
+    why = why_not_sent(state, now_tai_s, control)
+    return f"not stowed, though {WANTS_STOW[by]}: {why}" if why else ""
 
 
 def _arming(state: ControlState, control: ControlConfig) -> str:

@@ -34,6 +34,13 @@ class Verdict:
 
 
 S = TrackState
+_WHOSE_STOW = {
+    "": "the stow is over",
+    "schedule": "between passes; the next pass ends it",
+    "wind": "the wind is strong; once it is calm the stow ends by itself",
+    "panel": "somebody stowed the antenna; it is left alone until the ACU leaves the stow, or `acu-daemon unstow`",
+    "operator": "a person stowed the antenna; `acu-daemon unstow` ends it",
+}
 
 
 def verdict(seen: Snapshot) -> Verdict:
@@ -47,7 +54,7 @@ def verdict(seen: Snapshot) -> Verdict:
         return Verdict("LOCAL PANEL", Level.WATCH, "the local panel has control; nothing is commanded")
     if state is S.STOW:
         word = seen.acu_mode if seen.acu_mode in ("STOWED", "STOWING") else "STOW"
-        return Verdict(word, Level.WATCH, "somebody stows the antenna; it is left alone")
+        return Verdict(word, Level.CALM if seen.stow_by == "schedule" else Level.WATCH, _WHOSE_STOW[seen.stow_by])
     if state is S.IDLE:
         return _idle(seen)
     if state is S.PREPOSITION:
@@ -174,6 +181,7 @@ def alarms(seen: Snapshot) -> list[str]:
         seen.acu_faults,
         (seen.link_problem or "no link") if not seen.is_link_up else "",
         hands,
+        seen.stow_alarm,
         seen.envelope_alarm,
         seen.encoder_problem,
         seen.turn_alarm,

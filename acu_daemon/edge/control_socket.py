@@ -9,6 +9,7 @@ import errno
 import fcntl
 import os
 import socket
+import struct
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -35,7 +36,8 @@ SYSTEM_FAILS = (errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ENOBUFS)
 class ControlSocket:
     """Listens while the daemon runs; `answer` turns a line into the reply, at once."""
 
-    def __init__(self, directory: Path, answer: Callable[[str], str]) -> None:
+    def __init__(self, directory: Path, answer: Callable[[str, str], str]) -> None:
+        """answer: of a line and of whose it is."""
         self._directory = directory
         self._answer = answer
         self._server: asyncio.Server | None = None
@@ -80,7 +82,8 @@ class ControlSocket:
         self._client_count += 1
         try:
             async with asyncio.timeout(PATIENCE_S):
-                reply = "error too many clients" if self._client_count > MOST_CLIENTS else await self._reply(reader)
+                is_many = self._client_count > MOST_CLIENTS
+                reply = "error too many clients" if is_many else await self._reply(reader, _peer(writer))
                 writer.write(f"{reply}\n".encode())
                 await writer.drain()
         except (TimeoutError, OSError):
@@ -89,12 +92,21 @@ class ControlSocket:
             self._client_count -= 1
             writer.close()
 
-    async def _reply(self, reader: asyncio.StreamReader) -> str:
+    async def _reply(self, reader: asyncio.StreamReader, who: str) -> str:
         try:
             line = await reader.readline()
         except ValueError:  # longer than the limit
             return "error the line is too long"
-        return self._answer(line.decode("ascii", "replace").strip())
+        return self._answer(line.decode("ascii", "replace").strip(), who)
+
+
+def _peer(writer: asyncio.StreamWriter) -> str:
+    """The user at the other end, by number: a name may have to be asked for over the network."""
+    peer: socket.socket | None = writer.get_extra_info("socket")
+    if peer is None:
+        return ""
+    _, uid, _ = struct.unpack("3i", peer.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i")))
+    return f"uid {uid} on this machine"
 
 
 def ask(directory: Path, line: str) -> str:

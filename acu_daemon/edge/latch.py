@@ -1,4 +1,4 @@
-"""What forbids to move, in the state directory: `latch`, of an axis, and `disarmed`, each a file of its own.
+"""What forbids to move, in the state directory: `latch`, of an axis, `disarmed` and `stowed`, each a file of its own.
 
 Its existence forbids, whatever it holds and whatever the pass: the text, and the UTC since when, each in a line.  One
 that is kept under an older name of the antenna (edge/state_directory.py) stays where it is until a person clears it.
@@ -16,10 +16,11 @@ from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.writer import Latest, Writer, remove_file, replace_file
 from acu_daemon.orbit.timescales import utc_text
 
-LATCH, DISARMED = "latch", "disarmed"
+LATCH, DISARMED, STOWED = "latch", "disarmed", "stowed"
 ADVICE = {
     LATCH: "look at the antenna, then `acu-daemon clear`",
     DISARMED: "look at the antenna, then `acu-daemon arm`",
+    STOWED: "`acu-daemon unstow` ends it, or whose it is",
 }
 _LARGEST_BYTES = 1000
 

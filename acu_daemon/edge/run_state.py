@@ -1,7 +1,7 @@
 """What a restart needs (run.json in the state directory): the pass in progress, its newest fit, arming.
 
-Written whole, beside the loop, at every accepted fit and whenever state or arming change.  A latch and a disarm have
-files of their own.
+Written whole, beside the loop, at every accepted fit and whenever state or arming change.  A latch, a disarm and a
+stow have files of their own.
 """
 
 import contextlib
@@ -40,7 +40,7 @@ class RunState:
     track: str = ""
     arming: bool | None = None  # as a person left it; None: as configured
     held: bool | None = None  # the daemon held the antenna, with this fault bit; None: it did not
-    is_stow_kept: bool = False
+    is_stow_kept: bool = False  # only read: of a version that kept no file `stowed`
     fit: CarryOver | None = None
 
     def is_of(self, satellite: str, coming: Pass, clock_s: float | None) -> bool:
@@ -102,13 +102,12 @@ class RunStateKeeper:
     def see(self, state: ControlState) -> None:
         """Take the memory of a tick; it is written where it differs."""
         held = None if state.foreign_stop.held is None else state.foreign_stop.held.has_interlock_fault
-        arming, is_stow_kept = state.arming.by_people, state.intake.is_stow_kept
-        seen, last = (str(state.tracking.track), arming, held, is_stow_kept), self._state
+        seen, last = (str(state.tracking.track), state.arming.by_people, held), self._state
         self._tick_count += 1
         is_retried = bool(self.problem) and self._tick_count % RETRY_TICKS == 0
-        if seen != (last.track, last.arming, last.held, last.is_stow_kept) or is_retried:
-            track, arming, held, is_stow_kept = seen
-            self._state = replace(last, track=track, arming=arming, held=held, is_stow_kept=is_stow_kept)
+        if seen != (last.track, last.arming, last.held) or is_retried:
+            track, arming, held = seen
+            self._state = replace(last, track=track, arming=arming, held=held)
             self._latest.offer((self._state, self._fit))
 
     def _save(self, newest: tuple[RunState, FitResult | None]) -> None:
@@ -140,7 +139,6 @@ def _to_json(state: RunState) -> dict[str, Any]:
         "state": state.track,
         "arming": state.arming,
         "held": state.held,
-        "is_stow_kept": state.is_stow_kept,
         "fit": None if state.fit is None else to_json(state.satellite, state.fit),
     }
 

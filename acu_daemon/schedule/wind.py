@@ -3,7 +3,7 @@
        mean or gust above its limit                    both below resume_share of their limits for resume_after_s
 CALM ------------------------------> STRONG  STRONG ------------------------------------------------------------> CALM
 and from any of them STALE, once nothing was heard for max_age_s; a wind that was strong counts as strong until it is
-heard to be calm, one that was calm as `when_stale` says.
+heard to be calm, one that was calm as `when_stale` says.  Whoever looks may let a stale wind go.
 """
 
 from dataclasses import dataclass, replace
@@ -57,6 +57,7 @@ class WindWatch:
     wants_stow: bool = False
     calm_since_tai_s: float = inf
     newest: WindSample | None = None
+    is_let_go: bool = False  # a person has ended the stow of a stale wind; holds until the wind is heard again
 
     @property
     def words(self) -> str:
@@ -75,8 +76,9 @@ def watch(before: WindWatch, sample: WindSample | None, rules: WindRules, now_ta
         before = replace(before, newest=sample) if is_newest else before
     newest = before.newest
     if newest is None or now_tai_s - newest.tai_s > rules.max_age_s:
-        wants_stow = before.wants_stow or rules.when_stale == "stow"
+        wants_stow = not before.is_let_go and (before.wants_stow or rules.when_stale == "stow")
         return replace(before, wind=Wind.STALE, wants_stow=wants_stow, calm_since_tai_s=inf)
+    before = replace(before, is_let_go=False)
     if newest.mean_m_s > rules.mean_limit_m_s or newest.gust_m_s > rules.gust_limit_m_s:
         return replace(before, wind=Wind.STRONG, wants_stow=True, calm_since_tai_s=inf)
     if not before.wants_stow:

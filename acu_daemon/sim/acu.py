@@ -6,7 +6,7 @@ Angles are in the encoder frame, azimuth continuous.
 
 from collections.abc import Callable
 
-from acu_daemon.acu.commands import AcuMode, Identify, Poll, ReadFaults, SelectBackup, SelectMode, Stop
+from acu_daemon.acu.commands import AcuMode, Identify, Poll, ReadFaults, SelectBackup, SelectMode, Stop, Stow
 from acu_daemon.drivers.sa3842.angles import elevation_deg
 from acu_daemon.drivers.sa3842.codec import CommandEvent, encode_reply
 from acu_daemon.drivers.sa3842.messages import (
@@ -22,7 +22,6 @@ from acu_daemon.drivers.sa3842.messages import (
     Reply,
     ResetFault,
     Status,
-    Stow,
     WriteAndPoll,
     WriteParameter,
     WriteRegisters,

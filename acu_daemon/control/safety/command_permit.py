@@ -19,13 +19,16 @@ from acu_daemon.acu.commands import (
     SelectMode,
     SetWatchdog,
     Stop,
+    Stow,
     command_text,
 )
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.orders import Event, Orders
 from acu_daemon.control.registers import count_refusals
+from acu_daemon.control.safety.stow import why_not_sent
 from acu_daemon.control.startup import reached
 from acu_daemon.control.state import ControlState, StartStage
+from acu_daemon.control.tick_input import STOWED_BY_US
 from acu_daemon.pointing.envelope import Envelope
 
 DEEPER_DEG = 0.1  # what is no way further in: noise of a reading, rounding
@@ -55,6 +58,9 @@ def refusal(command: Command, state: ControlState, now_tai_s: float, config: Con
         return "a shadow commands nothing"
     if isinstance(command, Stop) or command == SetWatchdog(0.0):
         return ""
+    if isinstance(command, Stow):
+        is_wanted = state.stow.stow_by in STOWED_BY_US and state.startup.stage is not StartStage.NEW
+        return why_not_sent(state, now_tai_s, config) if is_wanted else "not in its place"
     if state.latch.problem:
         return f"latched: {state.latch.problem}"
     if not state.is_armed(config):

@@ -13,9 +13,10 @@ from acu_daemon.control.safety.arming import owe_stop, set_armed, set_disarmed
 from acu_daemon.control.safety.axis_latch import clear_latch, forget_motion
 from acu_daemon.control.safety.foreign_stop import forget_held, settle
 from acu_daemon.control.safety.interlock import forget_faults
+from acu_daemon.control.safety.stow import obey_stow
 from acu_daemon.control.startup import begin_again
 from acu_daemon.control.state import ControlState
-from acu_daemon.control.tick_input import Request
+from acu_daemon.control.tick_input import Asking, Request, StowWish
 
 
 def anew(state: ControlState, *, keeps_watchdog: bool = False) -> ControlState:
@@ -30,11 +31,13 @@ def disarm(state: ControlState, by: str, events: list[Event]) -> ControlState:
     return set_disarmed(anew(state, keeps_watchdog=True), by)
 
 
-def obey(state: ControlState, requests: Iterable[Request], config: ControlConfig, events: list[Event]) -> ControlState:
+def obey(state: ControlState, requests: Iterable[Asking], config: ControlConfig, events: list[Event]) -> ControlState:
     """Do what people ask."""
     for request in requests:
         is_stop_due = state.arming.is_stop_due
-        if request is Request.CLEAR and state.latch.problem:
+        if isinstance(request, StowWish):
+            state = obey_stow(state, request, config, events)
+        elif request is Request.CLEAR and state.latch.problem:
             events.append(Event("latch.cleared", {"latch": state.latch.problem}))
             state = owe_stop(clear_latch(anew(state)), is_due=is_stop_due and not state.is_armed(config))
         elif request is Request.ARM and not config.is_shadow:

@@ -8,6 +8,7 @@ from acu_daemon.control.safety.axis_watch import AWAY
 from acu_daemon.control.safety.foreign_stop import ANOTHER_HAND, take_faults, watch_for_stop
 from acu_daemon.control.safety.fresh_start import disarm, obey
 from acu_daemon.control.safety.interlock import watch_interlock
+from acu_daemon.control.safety.stow import watch_stow
 from acu_daemon.control.safety.turn_doubt import doubt, may_be_other_turn, watch_turn
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick_input import Observation
@@ -25,6 +26,8 @@ def supervise(
     state = disarm(state, ANOTHER_HAND, events) if is_stopped else state
     state, is_stopped = take_faults(state, seen)
     state = disarm(state, ANOTHER_HAND, events) if is_stopped else state
+    state, is_left = watch_stow(before, state, events)
+    state = disarm(state, ANOTHER_HAND, events) if is_left and state.is_armed_by_people(config) else state
     state, person = watch_interlock(state, seen, config)
     state = disarm(state, person, events) if person else state
     state, problem = watch_antenna(state, seen, config)

@@ -6,6 +6,7 @@ from math import cos, hypot, inf, radians
 from acu_daemon.acu.commands import AcuMode
 from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.safety.stow import keeps_stowed
 from acu_daemon.control.state import ControlState, StartStage
 from acu_daemon.control.tick_input import Sky, TickInput
 from acu_daemon.control.tracking.approach import ACQUIRE_LEAD_S, lead_s
@@ -39,7 +40,7 @@ def find_causes(state: ControlState, given: TickInput, config: ControlConfig) ->
         return {Cause.LINK_SILENT}
     if state.latch.problem:
         return {Cause.LINK_BACK, Cause.LATCHED}
-    causes = {Cause.LINK_BACK} | _of_status(status, is_stow_kept=state.intake.is_stow_kept)
+    causes = {Cause.LINK_BACK} | _of_status(status, is_stowed=keeps_stowed(state, given.now_tai_s, config))
     if not state.is_armed(config):
         return causes | _of_others(state, status, given, config)
     if state.startup.stage is StartStage.READY:
@@ -102,15 +103,11 @@ def _of_others(state: ControlState, status: AcuStatus, given: TickInput, config:
     return causes | (_of_plan(state, status, given, config) & still)
 
 
-def _of_status(status: AcuStatus, *, is_stow_kept: bool) -> set[Cause]:
+def _of_status(status: AcuStatus, *, is_stowed: bool) -> set[Cause]:
     is_local = not status.is_remote_enabled or status.mode is AcuMode.MANUAL
-    is_stowed = status.mode in (AcuMode.STOWING, AcuMode.STOWED)
     causes = {Cause.LOCAL_PANEL if is_local else Cause.REMOTE_AGAIN}
     causes.add(Cause.ACU_FAULT if status.mode is AcuMode.FAULT else Cause.FAULT_GONE)
-    if is_stow_kept:
-        causes.add(Cause.STOWING)
-    if not is_stowed:
-        causes.add(Cause.STOW_LEFT)
+    causes.add(Cause.STOWING if is_stowed else Cause.STOW_LEFT)
     return causes
 
 

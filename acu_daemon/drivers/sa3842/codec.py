@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
-from acu_daemon.acu.commands import AcuMode, Identify, Poll, ReadFaults, SelectBackup, SelectMode, Stop
+from acu_daemon.acu.commands import AcuMode, Identify, Poll, ReadFaults, SelectBackup, SelectMode, Stop, Stow
 from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.drivers.sa3842.angles import azimuth_code, azimuth_deg, elevation_code, elevation_deg
 from acu_daemon.drivers.sa3842.fields import FieldError, hex_text, hex_value, nibble_values, nibbles_text
@@ -29,7 +29,6 @@ from acu_daemon.drivers.sa3842.messages import (
     Reply,
     ResetFault,
     Status,
-    Stow,
     WriteAndPoll,
     WriteParameter,
     WriteRegisters,

@@ -6,7 +6,7 @@ it once read, unchanged.
 
 from dataclasses import dataclass
 
-from acu_daemon.acu.commands import AcuMode, Backup, Identify, Poll, ReadFaults, SelectBackup, SelectMode, Stop
+from acu_daemon.acu.commands import AcuMode, Backup, Identify, Poll, ReadFaults, SelectBackup, SelectMode, Stop, Stow
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,11 +21,6 @@ class WriteRegisters:
 @dataclass(frozen=True, slots=True)
 class ReadRegisters:
     """Ask for the command registers and the count of writes."""
-
-
-@dataclass(frozen=True, slots=True)
-class Stow:
-    """Drive to the stow position."""
 
 
 @dataclass(frozen=True, slots=True)
