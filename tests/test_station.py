@@ -131,7 +131,7 @@ def test_a_kill_in_mid_pass_is_gone_on_from_and_nothing_is_lost(tmp_path: Path) 
 
 def test_a_persons_words_hold_at_once_and_a_bad_file_is_refused_while_the_old_one_stays(tmp_path: Path) -> None:
     def force(access: StationAccess) -> None:
-        request = PassRequest("behind", access.runs.day._book[1].culmination_tai_s, Wish.FORCE)
+        request = PassRequest("behind", access.runs.day.keeper.book[1].culmination_tai_s, Wish.FORCE)
         with ScheduleFile(tmp_path / "state") as file:
             file.say(request, START, "a person")
 

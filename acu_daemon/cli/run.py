@@ -34,7 +34,8 @@ from acu_daemon.cli.options import (
 )
 from acu_daemon.cli.rehearsal import clock_text, meet_in_rehearsal, met_by_chance
 from acu_daemon.cli.run_setup import Prepared, RunSetup, prepare
-from acu_daemon.cli.run_station import StationSetup, first_usable, run_station
+from acu_daemon.cli.run_station import run_station
+from acu_daemon.cli.station_setup import StationSetup, first_usable
 from acu_daemon.cli.weather_watch import WeatherWatch
 from acu_daemon.config.load import load_station
 from acu_daemon.config.to_settings import driver_of

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from acu_daemon.cli.run_station import StationRuns, StationSetup, first_usable
+from acu_daemon.cli.station_runs import StationRuns
+from acu_daemon.cli.station_setup import StationSetup, first_usable
 from acu_daemon.cli.virtual_pass import events_to
 from acu_daemon.daemon.service import Outcome, PassJob
 from acu_daemon.drivers.sa3842.codec import address_byte
@@ -117,7 +118,7 @@ def run_days(
         for tai_s, action in script:
             loop.call_later(tai_s - begin_tai_s, _do, action, StationAccess(runs, acu, link, config), killed)
         loop.call_later(end_tai_s - begin_tai_s, runs.stop, "the end of the days")
-        await runs.day.first_plan()
+        await runs.day.keeper.first_plan()
         running: asyncio.Future[Any] = asyncio.ensure_future(runs.run())
         try:
             await asyncio.wait([running, killed], return_when=asyncio.FIRST_COMPLETED)

@@ -99,11 +99,11 @@ class ScheduleSection(Section):
     post_s: float = Field(
         default=10.0, ge=1, le=3600, description="After each pass, for the safe stop and the hooks.  Decides the same."
     )
-    after: Literal["park", "stay"] = Field(
+    after: Literal["next", "park", "stow", "stay"] = Field(
         default="stay",
         description=(
-            "What the antenna does between passes: park, or stay where it is.  Decides "
-            "where the antenna is when nobody looks."
+            "What the antenna does between passes: wait where the next one rises, park, be stowed, or stay "
+            "where it is.  Decides where the antenna is when nobody looks."
         ),
     )
     next_within_s: float = Field(
@@ -111,7 +111,8 @@ class ScheduleSection(Section):
         ge=0,
         le=86400,
         description=(
-            "Where the next pass is nearer than this, the antenna does not park.  Decides whether it moves twice."
+            "Where the next pass is nearer than this, the antenna neither parks nor is stowed.  Decides whether it "
+            "moves twice."
         ),
     )
     park_az_deg: float = Field(

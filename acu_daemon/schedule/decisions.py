@@ -8,6 +8,9 @@ from acu_daemon.schedule.exact_plan import AntennaPlace, Slot, best_slots, slots
 from acu_daemon.schedule.pass_track import PassTrack
 from acu_daemon.schedule.rules import SAME_PASS_S, PassRequest, StationRules, Wish
 
+RESUMED = "gone on with after a restart"
+MUST: dict[Wish | None, str] = {Wish.FORCE: "forced by a person", Wish.GO_ON: RESUMED}
+
 
 @dataclass(frozen=True, slots=True)
 class Decision:
@@ -25,7 +28,7 @@ def decide(
     held = {id(slot.track): slot for slot in frozen}
     refused = {id(one): reason for one in tracks if id(one) not in held and (reason := _never(one, rules))}
     open_tracks = [one for one in tracks if id(one) not in refused]
-    forced = [one for one in open_tracks if _wish(one, rules.requests) is Wish.FORCE]
+    forced = [one for one in open_tracks if _wish(one, rules.requests) in MUST]
     chosen = best_slots(open_tracks, rules, frozen=frozen, forced=forced, place=place)
     granted: dict[int, list[Slot]] = {}
     for slot in chosen:
@@ -58,7 +61,7 @@ def _never(track: PassTrack, rules: StationRules) -> str:
     if wish is Wish.EXCLUDE:
         return "excluded by a person"
     top_deg, least_deg = track.coming.culmination_el_deg, track.rules.min_culmination_deg
-    if top_deg < least_deg and wish is not Wish.FORCE:
+    if top_deg < least_deg and wish not in MUST:
         return f"culminates at {top_deg:.1f} deg, min_culmination_deg is {least_deg:g}"
     if next(slots_of(track, (), rules), None) is not None:
         return ""
@@ -71,7 +74,8 @@ def _never(track: PassTrack, rules: StationRules) -> str:
 
 
 def _granted_text(slot: Slot, rules: StationRules) -> str:
-    said = ["forced by a person"] if _wish(slot.track, rules.requests) is Wish.FORCE else []
+    wish = _wish(slot.track, rules.requests)
+    said = [MUST[wish]] if wish in MUST else []
     if slot.is_cut:
         said.append(f"cut to {_clock(slot.start_tai_s)} to {_clock(slot.end_tai_s)}")
     return ", ".join(said)

@@ -38,6 +38,7 @@ class Wish(StrEnum):
     """What a person wants of a pass."""
 
     FORCE = "force"
+    GO_ON = "go on"  # not a person's: the pass was on when the daemon was killed
     EXCLUDE = "exclude"
     NONE = "none"  # neither: an earlier word is withdrawn
 

@@ -1,0 +1,125 @@
+"""The course of the pass that is on: what was seen of it, what hooks hear of that, and how it came out."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import structlog
+
+from acu_daemon.cli.schedule_keeper import ScheduleKeeper
+from acu_daemon.daemon.service import Outcome
+from acu_daemon.daemon.snapshot import Snapshot
+from acu_daemon.daemon.verdict import alarms
+from acu_daemon.edge.hooks import Hook, HookResult, Hooks
+from acu_daemon.schedule.book import Entry, PassState
+
+DEGRADED_SHARE = 0.5  # of the useful seconds with the signal
+NO_SIGNAL = "no signal: the satellite was silent, or not where it should be"
+
+
+@dataclass(slots=True)
+class Tracked:
+    """What was seen of the pass that is on."""
+
+    locked_s: float = 0.0
+    on_path_s: float = 0.0
+    is_told_of_signal: bool = True
+    was_acquired: bool = False
+    last_tai_s: float = math.nan
+    words: list[str] = field(default_factory=list)  # what else there is to say of it, each once
+    hooks: list[HookResult] = field(default_factory=list)
+
+    def note(self, word: str) -> None:
+        """Remember something to say."""
+        if word not in self.words:
+            self.words.append(word)
+
+
+class PassCourse:
+    """Owned by the loop.  entry: the pass that is on; None: none is."""
+
+    def __init__(self, keeper: ScheduleKeeper, hooks: Hooks, about: Callable[[Entry], dict[str, Any]]) -> None:
+        self._keeper, self._hooks, self._about = keeper, hooks, about
+        self._tracked = Tracked()
+        self._alarms: frozenset[str] = frozenset()
+        self.entry: Entry | None = None
+        self._log: Any = structlog.get_logger("station")
+
+    def begun(self, entry: Entry) -> None:
+        """The run of a pass begins."""
+        self._tracked = Tracked()
+        self.entry = self._keeper.change(entry, PassState.PREPASS, "")
+        self._hooks.call(Hook.BEFORE_PASS, self._about(entry))
+        self._hooks.call(Hook.DURING_PASS, self._about(entry))
+
+    def see(self, seen: Snapshot) -> None:
+        """Take the newest snapshot, of a pass or between passes."""
+        now_alarms = frozenset(alarms(seen))
+        new_alarms, self._alarms = now_alarms - self._alarms, now_alarms
+        if new_alarms:
+            about = {"alarms": sorted(new_alarms)} | (self._about(self.entry) if self.entry else {})
+            self._hooks.call(Hook.ON_ALARM, about)
+        results = self._hooks.take_results()
+        if self.entry is not None:
+            self._take_results(results)
+            self._see_pass(self.entry, seen)
+
+    def _take_results(self, results: list[HookResult]) -> None:
+        self._tracked.hooks += results
+        for result in results:
+            if not result.is_good:
+                self._tracked.note(f"hook {result.hook}: {result.problem}")
+
+    def _see_pass(self, entry: Entry, seen: Snapshot) -> None:
+        tracked = self._tracked
+        if seen.stow_by:
+            tracked.note(f"stowed by the {seen.stow_by}")
+        if entry.state is PassState.PREPASS and seen.rise_in_s is not None and seen.rise_in_s <= 0.0:
+            self.entry = entry = self._keeper.change(entry, PassState.PASS, "")
+        tracked.is_told_of_signal = seen.is_told_of_signal
+        if not math.isnan(tracked.last_tai_s):
+            tracked.locked_s += (seen.tai_s - tracked.last_tai_s) * seen.is_acquired
+            is_on_path = entry.state is PassState.PASS and seen.is_on_path is True
+            tracked.on_path_s += (seen.tai_s - tracked.last_tai_s) * is_on_path
+        tracked.last_tai_s = seen.tai_s
+        if seen.is_acquired != tracked.was_acquired:
+            tracked.was_acquired = seen.is_acquired
+            self._hooks.call(Hook.AT_LOCK if seen.is_acquired else Hook.AT_LOSS, self._about(entry))
+
+    def ended(self, outcome: Outcome | None, reason: str = "") -> None:
+        """The run of a pass is over; outcome None: it ended by an error, the reason."""
+        if self.entry is None:
+            return
+        entry = self._keeper.change(self.entry, PassState.POSTPASS, "")
+        state, why = self._judged(entry, outcome, reason)
+        changed = self._keeper.change(entry, state, why)
+        self._hooks.end_during()
+        about = {"state": str(state), "reason": why, "locked_s": round(self._tracked.locked_s, 1)}
+        self._hooks.call(Hook.AFTER_PASS, self._about(changed) | about)
+        self._log.info("pass.done", entry=changed.name, state=str(state), reason=why)
+        self.entry = None
+
+    def _judged(self, entry: Entry, outcome: Outcome | None, reason: str) -> tuple[PassState, str]:
+        if outcome is None:
+            return PassState.FAILED, reason
+        tracked, words = self._tracked, "; ".join(self._tracked.words)
+        cause = words or "; ".join(sorted(self._alarms))
+        if not tracked.is_told_of_signal:
+            state, said = self._judged_by_path(entry, cause)
+        elif not outcome.has_acquired and tracked.locked_s == 0.0:
+            return PassState.FAILED, f"never acquired: {cause or NO_SIGNAL}"
+        else:
+            said = f"signal for {tracked.locked_s:.0f} of {entry.useful_s:.0f} useful seconds"
+            is_degraded = entry.useful_s <= 0.0 or tracked.locked_s / entry.useful_s < DEGRADED_SHARE
+            state = PassState.DEGRADED if is_degraded else PassState.DONE
+        return state, said if state is PassState.FAILED else "; ".join(text for text in (said, words) if text)
+
+    def _judged_by_path(self, entry: Entry, cause: str) -> tuple[PassState, str]:
+        """Of a station that is told of no signal: whether the antenna was where the satellite should be."""
+        on_path_s = self._tracked.on_path_s
+        said = f"by program track, on the path for {on_path_s:.0f} of {entry.useful_s:.0f} useful seconds"
+        if on_path_s == 0.0:
+            return PassState.FAILED, cause or "the antenna never came to the path"
+        is_degraded = on_path_s < DEGRADED_SHARE * entry.useful_s
+        return PassState.DEGRADED if is_degraded else PassState.DONE, said

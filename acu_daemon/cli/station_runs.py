@@ -1,0 +1,286 @@
+"""The runs of a station, one after another: rests, passes, moves; each with the memory of the one before."""
+
+import asyncio
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from math import ceil
+from typing import Any
+
+import structlog
+
+from acu_daemon.cli.kept import Kept, open_kept
+from acu_daemon.cli.options import Target
+from acu_daemon.cli.run_setup import make_job
+from acu_daemon.cli.station_day import StationDay
+from acu_daemon.cli.station_move import IN_PLACE, Horn, move_job, why_move_ends
+from acu_daemon.cli.station_setup import NoFits, StationSetup
+from acu_daemon.cli.weather_watch import WeatherWatch
+from acu_daemon.control.safety.stow import end_between_passes
+from acu_daemon.control.state import ControlState
+from acu_daemon.control.tick_input import StowWish
+from acu_daemon.daemon.health import Health
+from acu_daemon.daemon.live import LiveLine
+from acu_daemon.daemon.operator_requests import tell
+from acu_daemon.daemon.service import Outcome, PassJob, Service
+from acu_daemon.daemon.snapshot import Snapshot
+from acu_daemon.daemon.stopping import DEADLINE_S
+from acu_daemon.edge.clock import STEP_S
+from acu_daemon.edge.fit import FitRunner
+from acu_daemon.edge.schedule_file import ScheduleFile
+from acu_daemon.edge.state_directory import SnapshotFile
+from acu_daemon.edge.systemd import Notifier
+from acu_daemon.errors import AcuDaemonError
+from acu_daemon.model import Pass
+from acu_daemon.schedule.book import Entry
+from acu_daemon.schedule.decisions import RESUMED
+
+
+class StationRuns:
+    """One run after another, each with the memory of the one before.  Owned by the loop."""
+
+    def __init__(self, setup: StationSetup, first: Target, live: LiveLine | None) -> None:
+        self._setup, self._first, self._live = setup, first, live
+        self.day = StationDay(
+            setup.config,
+            setup.clock,
+            ScheduleFile(setup.directory),
+            first.station,
+            beside=setup.beside,
+            check=setup.check,
+            is_rehearsal=setup.clock.is_rehearsal,
+        )
+        self._notifier = Notifier()
+        self._health = Health(self._notifier)
+        self._snapshots = SnapshotFile(setup.directory, setup.files, 1)
+        self._weather = WeatherWatch(setup.config, first, setup.clock.tai_s())
+        self._service: Service | None = None
+        self._kept: Kept | None = None
+        self._memory: ControlState | None = None
+        self._stop_reason = ""
+        self._is_resting = False
+        self._is_placed = True  # where it waits after a pass
+        self._move_until_tai_s = math.inf
+        self._horn = Horn(self.day.hooks, setup.clock)
+        self._log: Any = structlog.get_logger("station")
+
+    def stop(self, reason: str) -> None:
+        """End early and safely."""
+        self._stop_reason = self._stop_reason or reason
+        if self._service is not None:
+            self._service.stop(reason)
+
+    def answer(self, line: str, who: str = "") -> str:
+        """Answer a person's line (daemon.operator_verbs).  who: says it, and from where."""
+        if self._service is None:
+            return "error the station starts"
+        name = line.split(" ")[0]
+        if name == "reload":
+            return tell(line=line, who=who, answer=self.day.ask_reload())
+        if name == "unstow" and (why := self.day.why_not_unstow()):
+            return tell(line=line, who=who, answer=f"error {why}")
+        return self._service.answer(line, who)
+
+    async def run(self) -> Outcome:
+        """Run until it is stopped.  Raises: NoAcuError: no good poll at the start."""
+        await self._weather.open()
+        try:
+            return await self._runs()
+        finally:
+            self._weather.close()
+
+    async def _runs(self) -> Outcome:
+        outcome = await self._pass() if self.day.look() else None
+        outcome = outcome or await self._rest()
+        while not self._stop_reason and outcome.reason != "duration over":
+            entry = self.day.keeper.coming()
+            if outcome.reason.endswith(" begins") and entry is not None:
+                outcome = await self._pass() or outcome
+            elif not self._is_placed and isinstance(after := self.day.after(), tuple):
+                self._is_placed = True
+                outcome = await self._move(*after)
+            if not self._stop_reason and outcome.reason != "duration over":
+                outcome = await self._rest()
+        return outcome
+
+    # The three kinds of runs
+
+    async def _rest(self) -> Outcome:
+        coming = self.day.keeper.coming()
+        target = self._first
+        job = self._job(target, _as_pass(coming), is_resting=True)
+        job = replace(job, satellite="" if coming is None else coming.satellite)
+
+        def why_anew(_is_waiting: bool, step_s: float) -> str:
+            if step_s and abs(self._setup.clock.follow()) > STEP_S:
+                self._setup.clock.obey()
+                self.day.keeper.anew_reason = f"the system clock was set by {step_s:+.1f} s"
+                return self.day.keeper.anew_reason
+            if why := self.day.look():
+                entry = self.day.keeper.coming()
+                is_resumed = entry is not None and entry.reason.startswith(RESUMED)  # it moved a moment ago
+                return why if entry is None or is_resumed or self._is_warned(self.day.about(entry)) else ""
+            if not self._is_placed and (why := self._after()):
+                return why
+            return "another pass is next" if self.day.keeper.coming() != coming else ""
+
+        return await self._serve(job, NoFits(), why_anew)
+
+    def _after(self) -> str:
+        """See to where the antenna waits after a pass; why the rest ends, empty: it does not."""
+        after = self.day.after()
+        if isinstance(after, StowWish) and self._service is not None:
+            if self._is_warned({"reason": "stow between passes"}):
+                self._horn.forget()
+                self._is_placed = True
+                self._service.ask(after)
+            return ""
+        if isinstance(after, tuple) and self._is_warned({"az_deg": after[0], "el_deg": after[1]}):
+            return "the antenna is moved"
+        return ""
+
+    def _is_warned(self, about: dict[str, Any]) -> bool:
+        hooks = self.day.station.hooks
+        return self._horn.is_heard(about, hooks.before_move_s, is_wanted=bool(hooks.before_move))
+
+    async def _pass(self) -> Outcome | None:
+        """Track the pass that is due; None: its files are refused."""
+        entry = self.day.keeper.coming()
+        if entry is None or entry.end_tai_s is None:
+            return None
+        try:
+            target, coming = self.day.begin(entry)
+            target = self._weather.on(target, self._setup.clock.tai_s())
+            if self._kept is not None:
+                self._kept.flush()
+            self._kept = open_kept(
+                self._setup.directory, target, coming, self._setup.clock, self._setup.files, self._setup.older
+            )
+            job = self._job(target, coming)
+        except AcuDaemonError as error:
+            self.day.cannot_begin(entry, str(error))
+            return None
+        is_cut = entry.end_tai_s < coming.set_tai_s - 1.0
+        job = replace(job, end_tai_s=min(job.end_tai_s, entry.end_tai_s)) if is_cut else job
+        if self._memory is None:  # the first of this process: as one of a single pass is resumed
+            job = replace(job, state=end_between_passes(self._kept.state), is_anew=False)
+        self._horn.forget()
+        self.day.begun(entry)
+        self._is_placed = False
+        try:
+            outcome = await self._serve(job, self._setup.make_runner(job), None)
+        except AcuDaemonError as error:
+            self.day.course.ended(None, str(error))
+            raise
+        self.day.course.ended(outcome)
+        return replace(outcome, reason="cut as planned") if is_cut and outcome.reason == "duration over" else outcome
+
+    async def _move(self, az_deg: float, el_deg: float) -> Outcome:
+        now_tai_s = self._setup.clock.tai_s()
+        job = self._job(self._first, None)
+        job, self._move_until_tai_s = move_job(job, az_deg, el_deg, now_tai_s)
+        self._log.info("station.moves", az_deg=az_deg, el_deg=el_deg)
+        self._horn.forget()
+        outcome = await self._serve(job, NoFits(), None)
+        self._move_until_tai_s = math.inf
+        return outcome
+
+    def _job(self, target: Target, coming: Pass | None, *, is_resting: bool = False) -> PassJob:
+        setup = self._setup
+        end_tai_s = setup.clock.tai_s() + setup.end_s - setup.clock.monotonic_s()
+        kept = self._kept if coming is not None and not is_resting else None
+        job = make_job(
+            target,
+            coming,
+            setup.link,
+            is_rehearsal=setup.clock.is_rehearsal,
+            end_tai_s=end_tai_s,
+            carried=kept.carried if kept else None,
+            memory=kept.memory if kept else None,
+        )
+        control = replace(job.control, is_shadow=setup.is_shadow, is_resting=is_resting)
+        state = job.state if self._memory is None else self._memory
+        after_tai_s = setup.clock.tai_s() if coming is None else coming.rise_tai_s + 60.0
+        shown = self.day.keeper.next_passes(after_tai_s)
+        state = state if is_resting else end_between_passes(state)
+        return replace(job, control=control, state=state, is_anew=self._memory is not None, next_passes=shown)
+
+    async def _serve(self, job: PassJob, runner: FitRunner, why_anew: Callable[[bool, float], str] | None) -> Outcome:
+        if self._kept is None:  # what people and the antenna have told before this process
+            setup = self._setup
+            self._kept = open_kept(setup.directory, self._first, None, setup.clock, setup.files, setup.older)
+            job = replace(job, state=self._kept.state)
+        kept = self._kept
+        service = Service(
+            job,
+            self._setup.link,
+            self._setup.clock,
+            runner,
+            on_snapshot=self._show,
+            on_fit=kept.offer if job.coming is not None and not job.control.is_resting else None,
+            on_estimate=kept.mount.offer if job.coming is not None and not job.control.is_resting else None,
+            on_state=kept.see,
+            on_end=self._on_end,
+            files_alarm=self._files_alarm,
+            elements_problem=lambda: self.day.fetching.problem,
+            why_anew=why_anew,
+        )
+        self._service, self._is_resting = service, job.control.is_resting
+        if self._stop_reason:
+            service.stop(self._stop_reason)
+        outcome = await service.run()
+        self._memory = service.memory
+        return outcome
+
+    def _on_end(self) -> None:
+        """No tick feeds the supervisor's watchdog while the antenna is stopped."""
+        if self._stop_reason:
+            self._notifier("STOPPING=1")
+            return
+        loop = asyncio.get_running_loop()
+        for second in range(ceil(DEADLINE_S) + 1):
+            loop.call_later(second, self._notifier, "WATCHDOG=1")
+
+    def _files_alarm(self) -> str:
+        kept = self._kept.problem if self._kept else ""
+        return "; ".join(text for text in (self._setup.files.problem, self.day.keeper.problem, kept) if text)
+
+    def _show(self, seen: Snapshot) -> None:
+        self._health.see(seen)
+        self._snapshots.write(seen)
+        self.day.see(seen)
+        self._obey_wind(seen)
+        if self._live is not None:
+            self._live.show(seen)
+        if math.isfinite(self._move_until_tai_s) and self._service is not None:
+            self._end_move(seen, self._service)
+
+    def _end_move(self, seen: Snapshot, service: Service) -> None:
+        why = why_move_ends(seen, self._move_until_tai_s)
+        if why and why != IN_PLACE:
+            self._log.warning("station.not_in_place", reason=why, state=seen.state, arming=seen.arming)
+        if why:
+            service.stop(why)
+
+    def _obey_wind(self, seen: Snapshot) -> None:
+        """The antenna is stowed for the wind; one that stands is not moved before the horn was heard."""
+        wish = self.day.wind.look(seen.tai_s, self.day.stow_by)
+        if wish is None or self._service is None:
+            return
+        if wish.is_wanted and self._is_resting and not self._is_warned({"reason": self.day.wind.seen.words}):
+            return
+        self._horn.forget()
+        self._service.ask(wish)
+
+    async def close(self) -> None:
+        """End what runs beside the runs."""
+        await self.day.close()
+        if self._kept is not None:
+            self._kept.flush()
+        self._notifier.close()
+
+
+def _as_pass(entry: Entry | None) -> Pass | None:
+    if entry is None:
+        return None
+    return Pass(entry.rise_tai_s, entry.culmination_tai_s, entry.set_tai_s, 0.0, entry.culmination_el_deg, 0.0, 0.0)
