@@ -33,8 +33,8 @@ FILES: dict[str, tuple[type[Section], str]] = {
 DECIDES = re.compile(r"(?s)(.+?[.)])  (Decides .+\.)")
 UNITS = {  # by the end of a key, the longest first
     "_deg_s2": "deg/s²", "_deg_s": "deg/s", "_m_s": "m/s", "_deg": "deg", "_km": "km", "_m": "m", "_s": "s", "_c": "°C",
-    "_db": "dB", "_h": "h", "_hpa": "hPa", "_percent": "%", "_arcsec": "arcsec", "_days": "d", "_utc": "UTC",
-    "_fraction": "of the beam",
+    "_db": "dB", "_h": "h", "_mb": "MB", "_hpa": "hPa", "_percent": "%", "_arcsec": "arcsec", "_days": "d",
+    "_utc": "UTC", "_fraction": "of the beam",
 }  # fmt: skip
 BOUNDS = (("ge", ">= "), ("gt", "> "), ("le", "<= "), ("lt", "< "))
 NEEDED = "**needed**"

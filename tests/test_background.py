@@ -21,9 +21,10 @@ from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.tick_input import PassPlan, Sky
 from acu_daemon.control.tracking.approach import lead_s
 from acu_daemon.control.tracking.state_table import TrackState
-from acu_daemon.daemon import background as module
+from acu_daemon.daemon import buffer_keeper as module
 from acu_daemon.daemon.area import CommonArea
-from acu_daemon.daemon.background import BESIDE, PAST_S, Background
+from acu_daemon.daemon.background import Background
+from acu_daemon.daemon.buffer_keeper import BESIDE, PAST_S
 from acu_daemon.model import AxisLimits, Correction, FitResult, Model, Prediction, Reading
 from acu_daemon.pointing.envelope import Envelope
 from acu_daemon.pointing.keyhole import longest_window_s
@@ -193,9 +194,9 @@ def test_an_ephemeris_that_has_not_so_much_is_asked_for_what_it_has(
     from_s: float, to_s: float, past_s: float, ahead_s: float
 ) -> None:
     room = Room(TrackState.SEARCH)
-    room.background._spans_tai_s = ((NOW - 9000.0, NOW - 8000.0), (NOW + from_s, NOW + to_s))
-    assert room.background._reach_s(NOW) == pytest.approx((past_s, ahead_s), abs=0.01)
-    request = room.background._request(NOW, room.area.take_readings())
+    room.background._buffer._spans_tai_s = ((NOW - 9000.0, NOW - 8000.0), (NOW + from_s, NOW + to_s))
+    assert room.background._buffer._reach_s(NOW) == pytest.approx((past_s, ahead_s), abs=0.01)
+    request = room.background._buffer._request(NOW, room.area.take_readings())
     assert request.start_tai_s == pytest.approx(NOW - PAST_S - past_s, abs=0.01)
     assert request.start_tai_s + request.horizon_s == pytest.approx(NOW + min(HORIZON_S + ahead_s, to_s), abs=0.01)
 
@@ -219,11 +220,11 @@ def test_the_path_goes_on_on_the_turn_of_the_last_buffer_but_autotracks_where_it
 ) -> None:
     room = Room(track, Sky(buffer(-200.0, 150.0, path_az_deg), FIT, PLAN))
     room.area.state = remembering(room.area.state, az_deg=stands_az_deg)
-    assert room.background._near_az_deg(RISE + at_s) == near_az_deg
+    assert room.background._buffer._near_az_deg(RISE + at_s) == near_az_deg
     room.area.sky = Sky(None, None, PLAN)
-    assert room.background._near_az_deg(RISE + at_s) == 50.0
+    assert room.background._buffer._near_az_deg(RISE + at_s) == 50.0
     room.area.sky = Sky(None, None, None)
-    assert room.background._near_az_deg(RISE + at_s) == stands_az_deg
+    assert room.background._buffer._near_az_deg(RISE + at_s) == stands_az_deg
 
 
 def events(logs: list[Any]) -> list[tuple[str, str]]:
@@ -334,11 +335,11 @@ def test_a_new_plan_is_predicted_for_and_asked_about_at_once_where_its_pass_is_n
 
 def test_without_the_fit_process_the_next_buffer_is_made_from_what_the_last_one_was() -> None:
     room = Room()
-    assert room.background._in_force(NOW) == (FIT, Model.NEW_FIT)
+    assert room.background._buffer._in_force(NOW) == (FIT, Model.NEW_FIT)
     room.area.sky = Sky(FULL, None, PLAN)
-    assert room.background._in_force(NOW) == (None, Model.ELEMENTS)
+    assert room.background._buffer._in_force(NOW) == (None, Model.ELEMENTS)
     room.area.sky = Sky(replace(FULL, model=Model.LAST_PASS), None, PLAN)
-    assert room.background._in_force(NOW) == (None, Model.ELEMENTS)  # nothing was left by a pass before
+    assert room.background._buffer._in_force(NOW) == (None, Model.ELEMENTS)  # nothing was left by a pass before
 
 
 @pytest.mark.parametrize("is_of_this_pass", [False, True])

@@ -298,7 +298,7 @@ def test_wrong_use_ends_with_status_2_and_a_reason(tmp_path: Path, config: Path,
         (replay(config, readings, tmp_path / "no" / "o", "--estimator", "all"), "no/o-circular: there is no directory"),
         (replay(config, readings, tmp_path / "o", satellite="moon"), "no such file; satellites in"),
         (replay(tmp_path / "nowhere", readings, tmp_path / "o"), "station.toml: no such file"),
-        (acu_daemon("replay", "--config", config), "Missing option"),
+        (acu_daemon("replay", "--config", config), "are needed, or --wire alone"),
     ]:
         assert done.code == 2, said
         assert said in done.err

@@ -23,6 +23,7 @@ from acu_daemon.config.onboard_tables import (
     PassSection,
     TargetRow,
 )
+from acu_daemon.config.recording_tables import RecordingSection
 from acu_daemon.config.satellite_tables import BrouwerSection, ElementsFileSection, LimitsSection
 from acu_daemon.config.schedule_tables import MaintenanceSection
 from acu_daemon.config.section import Section
@@ -114,6 +115,7 @@ OUT_OF_SAID: dict[str, tuple[type[Section], dict[str, Any]]] = {  # ranges that 
     "LimitsSection.max_eccentricity": (LimitsSection, {"min_eccentricity": 0.2}),
     "LimitsSection.max_inclination_deg": (LimitsSection, {"min_inclination_deg": 90.0, "max_inclination_deg": 80.0}),
     "ElementsFileSection.file": (ElementsFileSection, {"kind": "tle", "file": 1}),
+    "RecordingSection.send_to": (RecordingSection, {"send_to": ""}),
     "PassSection.from_utc": (PassSection, {"from_utc": "2026-01-01"}),
     "HoldRow.start_utc": (HoldRow, {"start_utc": "2026-01-01T00:00", "duration_s": 1.0}),
     "TargetRow.start_utc": (TargetRow, HERE | {"start_utc": 1.0, "duration_s": 1.0}),

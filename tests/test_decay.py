@@ -14,7 +14,7 @@ from flights import RISING_TAI_S, climb, demo_target, events_named, sky_of, stat
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acu_daemon.daemon.background import LEAST_HORIZON_S
+from acu_daemon.daemon.buffer_keeper import LEAST_HORIZON_S
 from acu_daemon.errors import OrbitError
 from acu_daemon.model import Correction, EarthOrientation
 from acu_daemon.orbit.element_set import ElementSet, rad_s_from_rev_day

@@ -17,7 +17,7 @@ from acu_daemon.control.orders import Event, Orders
 from acu_daemon.control.state import ControlState, StartStage
 from acu_daemon.control.tick_input import Exchange, Observation, Request, TickInput
 from acu_daemon.control.tracking.state_table import TrackState
-from acu_daemon.daemon import foreground as module
+from acu_daemon.daemon import decider as module
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.foreground import BLIND_S, Foreground
 from acu_daemon.daemon.port import Answer

@@ -16,8 +16,9 @@ from acu_daemon.assist.screening.another_satellite import why_not_this_satellite
 from acu_daemon.assist.session.estimator_comparison import compare, locked_readings, what_is_left_out
 from acu_daemon.assist.session.refit import RefitSetup
 from acu_daemon.assist.session.replay_readings import BUFFER_S, Replayed, replay
-from acu_daemon.cli.options import SPARE_S, Config, Satellite, Target, lacking, load_target, whose_recording
+from acu_daemon.cli.options import SPARE_S, Target, lacking, load_target, whose_recording
 from acu_daemon.cli.outputs import refuse_unwritable
+from acu_daemon.cli.replay_wire import replay_wire
 from acu_daemon.config.to_settings import estimator_settings, pedestal_text
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.edge.carry_over_file import reason_of
@@ -45,14 +46,18 @@ class _Job:
 
 
 def command(
-    config: Config,
-    satellite: Satellite,
+    config: Annotated[
+        Path | None, typer.Option("--config", help="Directory with station.toml and satellites/NAME.toml.")
+    ] = None,
+    satellite: Annotated[
+        str | None, typer.Option("--satellite", help="NAME of satellites/NAME.toml in the config directory.")
+    ] = None,
     readings: Annotated[
-        Path, typer.Option("--readings", metavar="IN.csv", help="Recorded readings: utc,az_deg,el_deg,locked.")
-    ],
+        Path | None, typer.Option("--readings", metavar="IN.csv", help="Recorded readings: utc,az_deg,el_deg,locked.")
+    ] = None,
     out: Annotated[
-        Path, typer.Option("--out", metavar="OUT.csv", help="Predictions: utc,az_deg,el_deg,sigma_deg,source.")
-    ],
+        Path | None, typer.Option("--out", metavar="OUT.csv", help="Predictions: utc,az_deg,el_deg,sigma_deg,source.")
+    ] = None,
     estimator: Annotated[
         str | None,
         typer.Option(
@@ -79,6 +84,18 @@ def command(
             help="A mount.json of a state directory: what the station then knew of its antenna.  Default: nothing.",
         ),
     ] = None,
+    wire: Annotated[
+        Path | None,
+        typer.Option(
+            "--wire",
+            metavar="FILE.tape.gz",
+            help="In place of all others: a recording that `run` has kept of a pass (docs/recordings.md).  All that "
+            "the ACU said goes through the daemon's decision again, and every command has to be the same.",
+        ),
+    ] = None,
+    fits_anew: Annotated[
+        bool, typer.Option("--fits-anew", help="With --wire: compute the fits too, and not take them as recorded.")
+    ] = False,
 ) -> None:
     """Predict every recorded instant from the locked readings before it, as the daemon would have.
 
@@ -87,8 +104,15 @@ def command(
     those of an antenna that did not follow the path, as after a stop; where there are none, the locked ones.
 
     Exit status: 0; 1 the readings are probably not of this satellite (the files are written all the same), by the JSON
-    beside them or by what it takes to fit them; 2 wrong use or configuration.
+    beside them or by what it takes to fit them, or with --wire a decision differs; 2 wrong use or configuration.
     """
+    if wire is not None:
+        if any(one is not None for one in (config, satellite, readings, out, estimator, picture, memory)):
+            raise UsageError("--wire FILE stands alone, but for --fits-anew: the recording has all that it needs")
+        replay_wire(wire, fits_anew=fits_anew)
+        return
+    if config is None or satellite is None or readings is None or out is None:
+        raise UsageError("--config, --satellite, --readings and --out are needed, or --wire alone")
     names: list[str | None] = [*ESTIMATORS] if estimator == ALL else [estimator]
     paths = {name: _beside(out, name) if estimator == ALL else out for name in names}
     if estimator == ALL and picture is None:

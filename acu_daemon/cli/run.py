@@ -32,6 +32,7 @@ from acu_daemon.cli.options import (
     nearest_to_pass,
     whose_recording,
 )
+from acu_daemon.cli.pass_tape import begin_tape
 from acu_daemon.cli.rehearsal import clock_text, meet_in_rehearsal, met_by_chance
 from acu_daemon.cli.run_setup import Prepared, RunSetup, prepare
 from acu_daemon.cli.run_station import run_station
@@ -60,6 +61,8 @@ from acu_daemon.edge.scheduling import keep_to_this_thread
 from acu_daemon.edge.signals import STOPS, take_signals
 from acu_daemon.edge.state_directory import SnapshotFile, antenna_directory, choice_text, older_folders, state_directory
 from acu_daemon.edge.systemd import Notifier
+from acu_daemon.edge.tape import no_note
+from acu_daemon.edge.tape_file import TapeFile
 from acu_daemon.edge.writer import QueuedStream, Writer
 from acu_daemon.errors import AcuDaemonError, UsageError
 
@@ -233,6 +236,7 @@ async def _run(
     frame: RunSetup, first: Prepared, live: LiveLine | None, recording: RecordingWriter | None, weather: WeatherWatch
 ) -> Outcome:
     clock, now = frame.clock, first
+    tape: TapeFile | None = None
     notifier = Notifier()
     health = Health(notifier)
     snapshot_ticks = SNAPSHOT_TICKS if live is None else 1
@@ -248,8 +252,8 @@ async def _run(
             live.show(seen)
 
     def files_alarm() -> str:
-        problems = (frame.files.problem, recording.problem if recording else "", now.kept.problem)
-        return "; ".join(problem for problem in problems if problem)
+        kept = (one.problem for one in (frame.files, recording, now.kept, tape) if one is not None)
+        return "; ".join(problem for problem in kept if problem)
 
     def why_anew(is_waiting: bool, step_s: float) -> str:
         if step_s:
@@ -260,13 +264,16 @@ async def _run(
         return "the weather has changed" if is_waiting and weather.look(clock.tai_s()) else ""
 
     def begin(memory: ControlState | None) -> Service:
-        nonlocal now
+        nonlocal now, tape
         if memory is not None:
             now.kept.flush()
             if abs(clock.follow()) > STEP_S:
                 clock.obey()
                 elements.target = _load(frame.config, frame.name, clock, frame.folders)
             now = prepare(frame, weather.on(elements.target), memory)
+        if tape is not None:
+            tape.close()
+        tape = begin_tape(frame.directory, now.target, now.job, frame.link, clock.tai_s(), frame.files)
         return Service(
             now.job,
             frame.link,
@@ -282,6 +289,7 @@ async def _run(
             files_alarm=files_alarm,
             elements_problem=lambda: fetching.problem,
             why_anew=why_anew,
+            note=no_note if tape is None else tape.note,
         )
 
     runs = Runs(begin)
@@ -302,6 +310,8 @@ async def _run(
         sync.cancel()
         await fetching.close()
         now.kept.flush()
+        if tape is not None:
+            tape.close()
         await control.close()
         weather.close()
         notifier.close()

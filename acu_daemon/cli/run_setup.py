@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import structlog
 
@@ -31,6 +31,14 @@ from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.units import DAY_S
 
 SHOWN_COUNT = 3  # of the passes to come
+
+
+class LineRate(Protocol):
+    """What of a link a job depends on."""
+
+    @property
+    def byte_time_s(self) -> float:
+        """Time a character spends on the wire; 0 where it is not known (TCP)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +120,7 @@ def next_text(satellite: str, rise_tai_s: float, culmination_el_deg: float) -> s
 def make_job(
     target: Target,
     coming: Pass | None,
-    link: Link,
+    link: LineRate,
     *,
     is_rehearsal: bool,
     end_tai_s: float = math.inf,

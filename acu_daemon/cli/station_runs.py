@@ -11,6 +11,7 @@ import structlog
 
 from acu_daemon.cli.kept import Kept, open_kept
 from acu_daemon.cli.options import Target
+from acu_daemon.cli.pass_tape import begin_tape
 from acu_daemon.cli.run_setup import make_job
 from acu_daemon.cli.station_day import StationDay
 from acu_daemon.cli.station_move import IN_PLACE, Horn, move_job, why_move_ends
@@ -30,6 +31,8 @@ from acu_daemon.edge.fit import FitRunner
 from acu_daemon.edge.schedule_file import ScheduleFile
 from acu_daemon.edge.state_directory import SnapshotFile
 from acu_daemon.edge.systemd import Notifier
+from acu_daemon.edge.tape import no_note
+from acu_daemon.edge.tape_file import TapeFile
 from acu_daemon.errors import AcuDaemonError
 from acu_daemon.model import Pass
 from acu_daemon.schedule.book import Entry
@@ -56,6 +59,7 @@ class StationRuns:
         self._weather = WeatherWatch(setup.config, first, setup.clock.tai_s())
         self._service: Service | None = None
         self._kept: Kept | None = None
+        self._tape: TapeFile | None = None  # of the pass in progress
         self._memory: ControlState | None = None
         self._stop_reason = ""
         self._is_resting = False
@@ -167,11 +171,16 @@ class StationRuns:
         self._horn.forget()
         self.day.begun(entry)
         self._is_placed = False
+        setup = self._setup
+        self._tape = begin_tape(setup.directory, target, job, setup.link, setup.clock.tai_s(), setup.files)
         try:
-            outcome = await self._serve(job, self._setup.make_runner(job), None)
+            outcome = await self._serve(job, setup.make_runner(job), None)
         except AcuDaemonError as error:
             self.day.course.ended(None, str(error))
             raise
+        finally:
+            if self._tape is not None:
+                self._tape.close()
         self.day.course.ended(outcome)
         return replace(outcome, reason="cut as planned") if is_cut and outcome.reason == "duration over" else outcome
 
@@ -211,19 +220,21 @@ class StationRuns:
             self._kept = open_kept(setup.directory, self._first, None, setup.clock, setup.files, setup.older)
             job = replace(job, state=self._kept.state)
         kept = self._kept
+        is_pass = job.coming is not None and not job.control.is_resting
         service = Service(
             job,
             self._setup.link,
             self._setup.clock,
             runner,
             on_snapshot=self._show,
-            on_fit=kept.offer if job.coming is not None and not job.control.is_resting else None,
-            on_estimate=kept.mount.offer if job.coming is not None and not job.control.is_resting else None,
+            on_fit=kept.offer if is_pass else None,
+            on_estimate=kept.mount.offer if is_pass else None,
             on_state=kept.see,
             on_end=self._on_end,
             files_alarm=self._files_alarm,
             elements_problem=lambda: self.day.fetching.problem,
             why_anew=why_anew,
+            note=self._tape.note if is_pass and self._tape is not None else no_note,
         )
         self._service, self._is_resting = service, job.control.is_resting
         if self._stop_reason:
@@ -242,8 +253,8 @@ class StationRuns:
             loop.call_later(second, self._notifier, "WATCHDOG=1")
 
     def _files_alarm(self) -> str:
-        kept = self._kept.problem if self._kept else ""
-        return "; ".join(text for text in (self._setup.files.problem, self.day.keeper.problem, kept) if text)
+        kept = (one.problem for one in (self._setup.files, self.day.keeper, self._kept, self._tape) if one is not None)
+        return "; ".join(text for text in kept if text)
 
     def _show(self, seen: Snapshot) -> None:
         self._health.see(seen)

@@ -17,12 +17,16 @@ from acu_daemon.assist.session.refit import RefitSetup
 from acu_daemon.cli.options import Target, coming_pass
 from acu_daemon.cli.run_setup import make_job
 from acu_daemon.cli.simulated import station_air
+from acu_daemon.cli.tape_head import head_of
 from acu_daemon.daemon.service import Outcome, Service, SignalSource
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.drivers.sa3842.codec import CommandDecoder, address_byte
 from acu_daemon.drivers.sa3842.messages import Command
 from acu_daemon.edge.clock import LoopClock
 from acu_daemon.edge.fit import FitRunner, InlineFitRunner
+from acu_daemon.edge.tape import no_note
+from acu_daemon.edge.tape_file import TapeFile
+from acu_daemon.edge.writer import Writer
 from acu_daemon.model import Reading
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.acu_faults import break_acu
@@ -105,6 +109,7 @@ def fly(
     make_clock: Callable[[float], LoopClock] = LoopClock,
     make_runner: Callable[[RefitSetup], FitRunner] = InlineFitRunner,
     signal: SignalSource | None = None,
+    tape: Path | None = None,
 ) -> Flight:
     """Run the daemon on a pass in virtual time.
 
@@ -112,6 +117,7 @@ def fly(
     the link, each at its TAI, such as a power cycle.
     memory: what the station knows of its antenna; None: it keeps no such thing.
     make_...: other parts than the usual ones, such as a clock that stalls.  signal: of a receiver beside the ACU.
+    tape: a file to keep the pass in, as the daemon does.
     """
     flight = Flight()
     truth = sky
@@ -144,11 +150,14 @@ def fly(
         coming = coming_pass(target, begin_tai_s)
         job = make_job(target, coming, link, is_rehearsal=True, end_tai_s=end_tai_s, memory=memory)
         job = replace(job, control=replace(job.control, is_shadow=is_shadow, is_resting=is_resting))
+        files = Writer("tape", math.inf)
+        kept = None if tape is None else TapeFile(tape, head_of(target, job, link, begin_tai_s), files)
         service = Service(
             job,
             link,
             clock,
             make_runner(job.refit),
+            note=no_note if kept is None else kept.note,
             on_snapshot=flight.snapshots.append,
             on_estimate=flight.estimates.append,
             on_reading=flight.readings.append,
@@ -158,6 +167,9 @@ def fly(
         for tai_s, action in script:
             loop.call_later(tai_s - begin_tai_s, action, ScriptAccess(acu, link, clock, service, board))
         flight.outcome = await service.run()
+        if kept is not None:
+            kept.close()
+        files.close()
         acu.advance(clock.tai_s())
 
     with events_to(flight.events):

@@ -8,6 +8,7 @@ from acu_daemon.config.acu_tables import AcuSection
 from acu_daemon.config.antenna_tables import AtmosphereSection, MountSection, antenna_of
 from acu_daemon.config.elements_tables import ElementsSourcesSection
 from acu_daemon.config.envelope_tables import EnvelopeSection
+from acu_daemon.config.recording_tables import RecordingSection
 from acu_daemon.config.schedule_tables import ScheduleSection
 from acu_daemon.config.section import Name, Section
 from acu_daemon.config.station_day_tables import HooksSection, WindSection
@@ -192,6 +193,10 @@ class StationFile(Section):
         default=HooksSection(), description="Programs that are started at what happens in a pass (docs/schedule.md)."
     )
     wind: WindSection = Field(default=WindSection(), description="When the wind stows the antenna (docs/schedule.md).")
+
+    recording: RecordingSection = Field(
+        default=RecordingSection(), description="What is kept of every pass (docs/recordings.md)."
+    )
 
     @model_validator(mode="after")
     def _is_some_air(self) -> "StationFile":

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import structlog
@@ -21,23 +20,23 @@ from acu_daemon.acu.commands import (
 )
 from acu_daemon.acu.replies import AcuIdentity, AcuStatus, Done, FaultReport, Refused
 from acu_daemon.control.control_config import ControlConfig
-from acu_daemon.control.hear import hear
 from acu_daemon.control.orders import Event
 from acu_daemon.control.receiver_signal import SignalSample
 from acu_daemon.control.safety.arming import owes_stop
 from acu_daemon.control.safety.interlock import question
 from acu_daemon.control.safety.stow import stow_command
 from acu_daemon.control.state import StartStage, Watchdog
-from acu_daemon.control.tick import tick
-from acu_daemon.control.tick_input import Arrival, Asking, Observation, TickInput
+from acu_daemon.control.tick_input import Arrival, Asking
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.clock_watch import ClockWatch
+from acu_daemon.daemon.decider import Decider
 from acu_daemon.daemon.line_watch import LineWatch
 from acu_daemon.daemon.motion import Motion
 from acu_daemon.daemon.port import AcuPort, Answer
 from acu_daemon.daemon.stopping import DEADLINE_S, stop_antenna
 from acu_daemon.daemon.tick_lateness import Lateness
 from acu_daemon.edge.clock import Clock
+from acu_daemon.edge.tape import Note, no_note
 from acu_daemon.model import Reading
 
 DOUBT_EVERY_S = 1.0
@@ -64,9 +63,12 @@ class Foreground:
         after_tick: Callable[[], None],
         on_reading: Callable[[Reading], None] | None = None,
         signal: Callable[[float], SignalSample | None] | None = None,
+        note: Note = no_note,
     ) -> None:
         """signal: what a receiver beside the ACU has said since it was asked last, by TAI; None: there is none."""
         self._area = area
+        self._note = note
+        self._decider = Decider(area, config, note)
         self._port = port
         self._clock = clock
         self._config = config
@@ -74,7 +76,6 @@ class Foreground:
         self._on_reading = on_reading
         self._signal = signal
         self._doubt_again_s = -math.inf
-        self._seen = Observation()
         self._requests: tuple[Asking, ...] = ()
         self._connect_count = 0
         self._awake_until_s = -math.inf
@@ -121,7 +122,7 @@ class Foreground:
         state, now_s = self._area.state, self._clock.monotonic_s()
         if not self._config.is_resting:
             return False
-        is_known = self._seen.status is not None and state.startup.stage >= StartStage.REGISTERS_KNOWN
+        is_known = self._decider.seen.status is not None and state.startup.stage >= StartStage.REGISTERS_KNOWN
         has_business = question(state) is not None or stow_command(state, self._clock.tai_s(), self._config) is not None
         if not is_known or self._requests or state.arming.is_stop_due or has_business:
             self._awake_until_s = now_s + AWAKE_S
@@ -144,9 +145,9 @@ class Foreground:
 
     def _has_news(self) -> bool:
         """Whether the start can go on: its last question is answered, or the first status of all has come."""
-        if self._seen.extra is None:
-            return self._seen.status is not None and self._area.state.intake.status is None
-        return not isinstance(self._seen.extra.reply, Refused | None)
+        if self._decider.seen.extra is None:
+            return self._decider.seen.status is not None and self._area.state.intake.status is None
+        return not isinstance(self._decider.seen.extra.reply, Refused | None)
 
     def _next_s(self, begun_tai_s: float) -> float:
         """How long the next decision's exchanges take: one of the start's alone as long as the last, else the most."""
@@ -162,27 +163,20 @@ class Foreground:
             self._status_s = self._clock.monotonic_s()
             self._hear(Poll(), first)
         requests, self._requests = self._requests, ()
-        seen = replace(
-            self._seen,
-            silence_s=self._silence_s(),
-            must_poll=port.must_poll,
-            has_room=port.has_room,
-            requests=requests,
-        )
+        silence_s, must_poll, has_room = self._silence_s(), port.must_poll, port.has_room
         now_tai_s = self._clock.tai_s()
-        given = TickInput(seen, area.sky, now_tai_s, None if self._signal is None else self._signal(now_tai_s))
-        area.state, orders = tick(area.state, given, self._config)
+        signal = None if self._signal is None else self._signal(now_tai_s)
+        orders = self._decider.decide(now_tai_s, silence_s, requests, signal, must_poll=must_poll, has_room=has_room)
         self._report(orders.events)
-        self._seen = Observation()
         if not port.is_up:
             return
-        is_answered = await (self._question() if seen.must_poll else self._do(orders.first))
+        is_answered = await (self._question() if must_poll else self._do(orders.first, "1"))
         is_starting = area.state.startup.stage is not StartStage.READY
-        is_progress = not seen.must_poll or is_starting  # no poll in the place of a write
+        is_progress = not must_poll or is_starting  # no poll in the place of a write
         self.answered_count += is_answered and is_progress
         if orders.extra is not None and port.is_up and not port.must_poll:
             await port.idle_gap()
-            await self._do(orders.extra)
+            await self._do(orders.extra, "2")
 
     def ask(self, request: Asking) -> None:
         """Take a person's request; the next tick obeys."""
@@ -196,11 +190,13 @@ class Foreground:
         is_blind = self._clock.monotonic_s() - self._status_s > max(BLIND_S, self._config.acu.silence_s) + rest_s
         return self._port.silence_s if self._port.is_up and not is_another and not is_blind else math.inf
 
-    async def _do(self, command: Command) -> bool:
+    async def _do(self, command: Command, order: str = "") -> bool:
         """One exchange; what it brings is gathered for the next decision.  A refusal is followed by a poll at once.
 
-        True: a reply came, be it a refusal.
+        order: which of the tick's it is, for the tape.  True: a reply came, be it a refusal.
         """
+        if order:
+            self._note(("D", order))
         answer = await self._port.exchange(command)
         if isinstance(command, PointAndPoll | Poll) and answer.reply is not None and not self._port.no_contact:
             self._status_s = self._clock.monotonic_s()
@@ -223,25 +219,23 @@ class Foreground:
     async def _poll_after_nak(self, refused: Command, why: str) -> None:
         self._log.warning("acu.nak", command=command_text(refused), **({"reason": why} if why else {}))
         await self._port.idle_gap()
+        self._note(("D", "n"))
         answer = await self._port.exchange(Poll())
         if isinstance(answer.reply, AcuStatus):
             self._hear(Poll(), answer)
 
     def _hear(self, command: Command, answer: Answer) -> None:
         """Gather a reply for the next decision, and hand its reading on."""
-        area = self._area
         arrival = Arrival(command, answer.reply, answer.started_tai_s, answer.first_byte_tai_s, answer.is_sure)
-        area.state, heard = hear(area.state, self._seen, arrival, self._config)
-        if heard.seen.extra is not self._seen.extra:
+        extra_before = self._decider.seen.extra
+        heard = self._decider.hear(arrival)
+        if heard.seen.extra is not extra_before:
             self._report_extra(command, answer)
-        self._seen = heard.seen
         if heard.doubt and isinstance(answer.reply, AcuStatus):
             self._report_doubt(answer.reply, heard.doubt)
         if heard.reading is None:
             return
         self.motion.add(heard.reading)
-        if heard.is_to_fit:
-            area.to_fit.append(heard.reading)
         if self._on_reading is not None and answer.is_sure:
             self._on_reading(heard.reading)
 

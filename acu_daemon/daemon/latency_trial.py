@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from acu_daemon.assist.session.refit import RefitRequest
-from acu_daemon.daemon.background import REFIT_PERIOD_S
+from acu_daemon.daemon.buffer_keeper import REFIT_PERIOD_S
 from acu_daemon.daemon.port import AcuPort
 from acu_daemon.daemon.tick_lateness import Lateness
 from acu_daemon.edge.clock import Clock

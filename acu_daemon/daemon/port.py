@@ -14,6 +14,7 @@ from acu_daemon.acu.driver import AcuDriver
 from acu_daemon.acu.replies import AcuIdentity, AcuStatus, Done, Refused, Reply
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.link import Link, open_once
+from acu_daemon.edge.tape import Note, no_note
 from acu_daemon.errors import LinkError
 
 CYCLE_SHARE = 0.95  # of the period, for a write and an exchange beside it
@@ -42,8 +43,17 @@ class Answer:
 class AcuPort:
     """The ACU as the foreground sees it.  Owned by the foreground; `keep` runs as its own task."""
 
-    def __init__(self, link: Link, clock: Clock, driver: AcuDriver, period_s: float, device_delay_s: float) -> None:
+    def __init__(
+        self,
+        link: Link,
+        clock: Clock,
+        driver: AcuDriver,
+        period_s: float,
+        device_delay_s: float,
+        note: Note = no_note,
+    ) -> None:
         self._link = link
+        self._note = note
         self._clock = clock
         self._driver = driver
         self._deadline_s = driver.capabilities.reply_deadline_s
@@ -133,6 +143,7 @@ class AcuPort:
             if unread := self._link.drain_input():
                 self._driver.receive(unread, started_s)
             frame = self._driver.begin(command, started_s)
+            self._note(("X", started_s, started_tai_s, unread, frame))
             wire_s = self._driver.wire_bytes(command) * self._link.byte_time_s
             if frame:
                 self._link.write(frame)
@@ -142,13 +153,14 @@ class AcuPort:
             with contextlib.suppress(TimeoutError):
                 while reply is None:
                     data, arrival_s = await self._link.read(until_s)
+                    self._note(("R", arrival_s, data))
                     first_byte_s = arrival_s if first_byte_s is None else first_byte_s
                     reply = self._driver.receive(data, arrival_s)
         except LinkError as error:
             self.problem = self._broken = str(error)
             self._drop(str(error))
         if reply is None:
-            self._driver.fail(self._clock.monotonic_s())
+            self._fail()
             self.failed_exchange_count += 1
             self._unanswered_s = started_s if self._unanswered_s is None else self._unanswered_s
             return Answer(None, started_tai_s, None)
@@ -164,9 +176,16 @@ class AcuPort:
         first_byte_tai_s = None if first_byte_s is None else started_tai_s + first_byte_s - started_s
         return Answer(reply, started_tai_s, first_byte_tai_s, self._driver.is_sure)
 
+    def _fail(self) -> None:
+        now_s = self._clock.monotonic_s()
+        self._driver.fail(now_s)
+        self._note(("N", now_s))
+
     def question(self) -> Command | None:
         """A poll, or what may stand in its place; None: nothing may yet."""
-        return self._driver.question(self._clock.monotonic_s())
+        now_s = self._clock.monotonic_s()
+        self._note(("Q", now_s))
+        return self._driver.question(now_s)
 
     async def ask(self) -> Answer | None:
         """Poll, or do what must come before that: another question, or a pause until one may be asked; then None."""
@@ -237,8 +256,10 @@ class AcuPort:
                     continue
                 pause_s, reported = FIRST_BACK_OFF_S, ""
                 self._log.info("link.open", link=self._link.description)
+                self._note(("L", ""))
                 await self._reopen.wait()
                 self._log.warning("link.lost", link=self._link.description, reason=self.problem)
+                self._note(("L", self.problem))
                 await self._close()
         finally:
             self._up.clear()
@@ -247,6 +268,7 @@ class AcuPort:
     async def _close(self) -> None:
         await self._link.close()
         self._driver.forget()
+        self._note(("G",))
 
     async def open(self, *, tries_all: bool = False) -> None:
         """Open the link once.  It counts as up when the ACU has answered a poll on it.  LinkError: it has not.
@@ -287,4 +309,4 @@ class AcuPort:
     def abandon(self) -> None:
         """Give up an exchange whose waiter was cancelled, so that the next one starts clean."""
         if self._driver.is_outstanding:
-            self._driver.fail(self._clock.monotonic_s())
+            self._fail()

@@ -32,6 +32,7 @@ from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.fit import FitRunner
 from acu_daemon.edge.link import Link
 from acu_daemon.edge.signal_reader import SignalReader
+from acu_daemon.edge.tape import Note, no_note
 from acu_daemon.errors import NoAcuError, UsageError
 from acu_daemon.model import FitResult, Pass, Reading
 from acu_daemon.orbit.timescales import utc_text
@@ -120,6 +121,7 @@ class Service:
         on_end: Callable[[], None] | None = None,
         why_anew: Callable[[bool, float], str] | None = None,
         signal: SignalSource | None = None,
+        note: Note = no_note,
     ) -> None:
         """on_end: called when the run is over, before the safe stop, which may take stopping.DEADLINE_S.
 
@@ -148,7 +150,8 @@ class Service:
         self._started_tai_s = math.inf
         self._log: Any = structlog.get_logger("pass")
         self._area = CommonArea(state=begin_run(job.state, job.control))
-        self._port = AcuPort(link, clock, job.driver, job.control.period_s, job.device_delay_s)
+        self._note = note
+        self._port = AcuPort(link, clock, job.driver, job.control.period_s, job.device_delay_s, note)
         self._background = Background(
             self._area,
             runner,
@@ -159,6 +162,7 @@ class Service:
             control=job.control,
             on_fit=on_fit,
             on_estimate=on_estimate,
+            note=note,
         )
         self._foreground = Foreground(
             self._area,
@@ -168,6 +172,7 @@ class Service:
             after_tick=self._after_tick,
             on_reading=on_reading,
             signal=None if self._signal is None else self._signal.now,
+            note=note,
         )
         self._hands = Hands(self._area, job.control, self._foreground.ask, self.snapshot, clock.tai_s)
 
@@ -205,6 +210,7 @@ class Service:
             return True
         if self._on_end is not None:
             self._on_end()
+        self._note(("E", {}))
         is_stopped = await self._safe_stop()
         self._leave(is_stopped=is_stopped)
         return is_stopped
@@ -284,17 +290,8 @@ class Service:
             self._background.set_plan(job.move)
         if job.move is not None or job.coming is None:
             return
-        plan = plan_pass(
-            job.refit.propagator,
-            job.refit.site,
-            job.coming,
-            state.intake.az_deg,
-            axes.azimuth,
-            now_tai_s,
-            elevation=axes.elevation,
-            learned_count=state.turn.learned_count,
-            keyhole=job.refit.keyhole,
-        )
+        self._note(("P", now_tai_s))
+        plan = plan_of(job.refit, job.control, job.coming, state, now_tai_s)
         self._log.info(
             "pass.planned",
             rise_in_s=round(plan.rise_tai_s - now_tai_s, 1),
@@ -394,6 +391,21 @@ class Service:
             lateness_p99_ms=lateness.p99_ms,
             lateness_max_ms=lateness.max_ms,
         )
+
+
+def plan_of(setup: RefitSetup, control: ControlConfig, coming: Pass, state: ControlState, now_tai_s: float) -> PassPlan:
+    """The plan of a pass from where the antenna is now."""
+    return plan_pass(
+        setup.propagator,
+        setup.site,
+        coming,
+        state.intake.az_deg,
+        control.azimuth,
+        now_tai_s,
+        elevation=control.elevation,
+        learned_count=state.turn.learned_count,
+        keyhole=setup.keyhole,
+    )
 
 
 def _innermost(error: Exception) -> Exception:

@@ -27,7 +27,7 @@ class Writer:
     on_drained: told, in the thread, how many jobs were dropped since it was told last, once the queue is empty again.
     """
 
-    def __init__(self, name: str, limit: int = LIMIT, on_drained: Callable[[int], None] | None = None) -> None:
+    def __init__(self, name: str, limit: float = LIMIT, on_drained: Callable[[int], None] | None = None) -> None:
         self._limit = limit
         self._on_drained = on_drained
         self._jobs: SimpleQueue[Job | None] = SimpleQueue()

@@ -36,6 +36,7 @@ class Ephemeris:
         orientation: that of the station; with the same in both directions, it does not matter to an Earth-fixed one.
         Raises:  ElementsError: states that are no orbit around the Earth, or do not follow from each other.
         """
+        self.segments = tuple(segments)  # as they were given
         self.kind = segments[0].kind
         self.label = segments[0].label
         self.file = segments[0].file

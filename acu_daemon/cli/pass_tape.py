@@ -1,0 +1,38 @@
+"""The recording of a run: begun with it, closed after it."""
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import structlog
+
+from acu_daemon.cli.options import Target
+from acu_daemon.cli.tape_head import head_of
+from acu_daemon.daemon.service import PassJob
+from acu_daemon.edge.kept_tapes import PASSES, KeepRules, remove_old, tape_name
+from acu_daemon.edge.link import Link
+from acu_daemon.edge.tape_file import TapeFile
+from acu_daemon.edge.writer import Writer
+from acu_daemon.errors import ElementsError
+
+
+def begin_tape(
+    directory: Path, target: Target, job: PassJob, link: Link, now_tai_s: float, files: Writer
+) -> TapeFile | None:
+    """Begin the recording of a run, in its state directory; None: the station keeps none, or the run has no pass."""
+    rules = target.station.recording
+    if not rules.passes or job.coming is None:
+        return None
+    folder = directory / PASSES
+    files.put(partial(_remove_old, folder, KeepRules(rules.keep_days, rules.keep_mb)))
+    try:
+        head = head_of(target, job, link, now_tai_s)
+    except (ElementsError, ValueError) as error:
+        log: Any = structlog.get_logger("tape")
+        log.warning("tape.ended", reason=str(error))
+        return None
+    return TapeFile(folder / tape_name(job.coming.rise_tai_s, job.satellite), head, files)
+
+
+def _remove_old(folder: Path, rules: KeepRules) -> None:
+    remove_old(folder, rules)

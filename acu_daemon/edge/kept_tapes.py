@@ -1,0 +1,71 @@
+"""The recordings of a station's passes: how they are called, and which are removed so that a disk does not fill."""
+
+import contextlib
+import re
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import structlog
+
+from acu_daemon.edge.tape_file import SUFFIX, tapes_in
+from acu_daemon.orbit.timescales import utc_text
+from acu_daemon.units import DAY_S
+
+_LONGEST_NAME = 40
+PASSES = "passes"  # the folder in a state directory
+
+
+@dataclass(frozen=True, slots=True)
+class KeepRules:
+    """How long recordings are kept, and how much of them."""
+
+    days: float
+    megabytes: float
+
+
+def tape_name(rise_tai_s: float, satellite: str) -> str:
+    """Names sort by the time of the pass."""
+    utc = utc_text(rise_tai_s, 0).replace("-", "").replace(":", "")
+    name = re.sub(r"[^\w.]+", "-", satellite, flags=re.ASCII).strip("-.")[:_LONGEST_NAME]
+    return f"{utc}-{name or 'satellite'}{SUFFIX}"
+
+
+def remove_old(directory: Path, rules: KeepRules, now_unix_s: float | None = None) -> list[Path]:
+    """Remove the recordings that are too old or too many, the oldest first, and say so in the log."""
+    now_s = time.time() if now_unix_s is None else now_unix_s
+    found: list[tuple[float, int, Path]] = []
+    for path in tapes_in(directory):
+        with contextlib.suppress(OSError):
+            stat = path.stat()
+            found.append((stat.st_mtime, stat.st_size, path))
+    removed, why = _too_old_or_many(sorted(found), rules, now_s)
+    log: Any = structlog.get_logger("tape")
+    gone = []
+    for path in removed:
+        try:
+            path.unlink()
+        except OSError as error:
+            log.warning("tape.not_removed", file=str(path), reason=error.strerror or str(error))
+        else:
+            gone.append(path)
+    if gone:
+        log.info("tape.removed", count=len(gone), newest=gone[-1].name, reason=why)
+    return gone
+
+
+def _too_old_or_many(
+    found: Sequence[tuple[float, int, Path]], rules: KeepRules, now_s: float
+) -> tuple[list[Path], str]:
+    total_bytes = sum(size for _, size, _ in found)
+    removed, reasons = [], []
+    for modified_s, size, path in found:
+        is_old, is_too_much = now_s - modified_s > rules.days * DAY_S, total_bytes > rules.megabytes * 1e6
+        if not (is_old or is_too_much):
+            break
+        reasons.append(f"older than {rules.days:g} d" if is_old else f"more than {rules.megabytes:g} MB")
+        removed.append(path)
+        total_bytes -= size
+    return removed, ", ".join(dict.fromkeys(reasons))
