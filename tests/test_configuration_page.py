@@ -30,6 +30,7 @@ from acu_daemon.config.section import Section
 from acu_daemon.config.station_day_tables import HooksSection, WindSection
 from acu_daemon.config.station_tables import SafetySection, StationFile, TimeSection
 from acu_daemon.config.tracking_tables import ReceiverSection, TrackingSection
+from acu_daemon.config.web_tables import WebSection
 from acu_daemon.edge.hooks import Hook
 
 writer = load("write_configuration")
@@ -92,6 +93,9 @@ OUT_OF_SAID: dict[str, tuple[type[Section], dict[str, Any]]] = {  # ranges that 
     "MaintenanceSection.to_utc": (MaintenanceSection, {"from_utc": "2026-01-01T00:00:00Z", "to_utc": "2026-01-01"}),
     **{f"HooksSection.{hook}": (HooksSection, {str(hook): "a text"}) for hook in Hook},
     "WindSection.udp": (WindSection, {"udp": "4841"}),
+    "WebSection.listen": (WebSection, {"listen": "localhost:8642"}),
+    "WebSection.token_file": (WebSection, {"token_file": ""}),
+    "WebSection.names": (WebSection, {"names": [""]}),
     "WindSection.file": (WindSection, {"file": ""}),
     "TrackingSection.low_water_s": (TrackingSection, {"low_water_s": 90.0, "horizon_s": 90.0}),
     "ElementsSourcesSection.source": (ElementsSourcesSection, {"source": "ftp://example.org/gp"}),

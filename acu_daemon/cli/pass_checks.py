@@ -48,6 +48,10 @@ class PassChecks:
             self._log.warning("check.no_go", entry=entry.name, reason=no_go)
             self._told(entry, no_go)
 
+    def said_of(self, entry: Entry) -> str | None:
+        """What the newest check says against an entry; empty: nothing, None: it has not been checked."""
+        return self.no_go if self._entry is not None and self._entry.number == entry.number else None
+
     def may_begin(self, now_tai_s: float) -> bool:
         """Whether no check is under way, and none has just said no."""
         return self._checking is None and now_tai_s >= self._again_tai_s

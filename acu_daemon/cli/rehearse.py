@@ -24,6 +24,7 @@ from acu_daemon.cli.options import (
     load_target,
     nearest_to_pass,
 )
+from acu_daemon.cli.page import Web
 from acu_daemon.cli.run import command as run
 from acu_daemon.daemon.words import clock_text
 from acu_daemon.edge.clock import SystemClock
@@ -102,6 +103,7 @@ def command(
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Where report, picture, trace and recording go.")
     ] = Path("rehearsal-output"),
+    web: Web = None,
 ) -> None:
     """SIMULATION: fly the satellite's next pass now, with your station's files, on a simulated ACU.
 
@@ -127,7 +129,7 @@ def command(
     with _fake_acu(config, satellite, ("--at", at, "--at-monotonic", str(at_monotonic_s)), flown, chosen) as url:
         end_s = at_monotonic_s + flown.seconds - PROCESS_START_S
         with contextlib.suppress(typer.Exit):  # never acquired: the report says so
-            run(config, satellite, at, at_monotonic_s, end_s, flown.out / READINGS, acu=url)
+            run(config, satellite, at, at_monotonic_s, end_s, flown.out / READINGS, acu=url, web=web)
     if not _report(flown, chosen):
         raise typer.Exit(1)
 

@@ -32,6 +32,7 @@ from acu_daemon.cli.options import (
     nearest_to_pass,
     whose_recording,
 )
+from acu_daemon.cli.page import PageFrame, RunningPage, WatchedRuns, Web, chosen_page
 from acu_daemon.cli.pass_tape import begin_tape
 from acu_daemon.cli.rehearsal import clock_text, meet_in_rehearsal, met_by_chance
 from acu_daemon.cli.run_setup import Prepared, RunSetup, prepare
@@ -47,6 +48,7 @@ from acu_daemon.daemon.live import LiveLine
 from acu_daemon.daemon.runs import Runs
 from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.daemon.snapshot import Snapshot
+from acu_daemon.daemon.write_lease import WriteLease
 from acu_daemon.edge.clock import STEP_S, SystemClock
 from acu_daemon.edge.control_socket import ControlSocket
 from acu_daemon.edge.denied import denied
@@ -65,6 +67,7 @@ from acu_daemon.edge.tape import no_note
 from acu_daemon.edge.tape_file import TapeFile
 from acu_daemon.edge.writer import QueuedStream, Writer
 from acu_daemon.errors import AcuDaemonError, UsageError
+from acu_daemon.web.recent_events import RecentEvents
 
 STDERR = 2
 SNAPSHOT_TICKS = 5  # where no live line is drawn: a snapshot costs a tenth of a tick
@@ -129,6 +132,7 @@ def command(
     same_antenna: Annotated[
         bool, typer.Option("--same-antenna", help="The ACU of --acu moves the antenna of station.toml.")
     ] = False,
+    web: Web = None,
 ) -> None:
     """Track a satellite: the pass in progress, else the next one.  Without --satellite: the station, pass after pass.
 
@@ -153,6 +157,7 @@ def command(
         ends.callback(output.close)
         ends.callback(files.close)
         ends.callback(met.close)
+        events = RecentEvents()
         live = LiveLine(QueuedStream(sys.stderr, output)) if sys.stderr.isatty() else None
         configure_logs(
             clock.tai_s,
@@ -162,11 +167,14 @@ def command(
             before_line=live.clear if live else None,
             writer=output,
             choice=choice_text(config, state, is_rehearsal=clock.is_rehearsal),
+            on_line=events.add,
         )
         if not wait_for_clock(config, satellite, clock, end_s):
             return
         base = state_directory(state, is_rehearsal=clock.is_rehearsal)
-        antenna = antenna_of(load_station(config))
+        station = load_station(config)
+        page = PageFrame(chosen_page(web, station, config), events, WriteLease(clock.monotonic_s))
+        antenna = antenna_of(station)
         directory = antenna.folder(base)
         older = () if clock.is_rehearsal else older_folders(base, antenna)  # nothing is carried between rehearsals
         if satellite is None:
@@ -181,7 +189,7 @@ def command(
         if satellite is None:
             if record is not None:
                 raise UsageError("--record needs --satellite: of a station with many, a file belongs to one pass")
-            setup = StationSetup(config, clock, link, directory, files, end_s, shadow, older)
+            setup = StationSetup(config, clock, link, directory, files, end_s, shadow, older, page=page)
             runner = ends.enter_context(loop_runner())
             outcome = _watched(runner, run_station(setup, clock, target, live))
             if not outcome.is_stopped:
@@ -195,7 +203,7 @@ def command(
         weather = WeatherWatch(config, target, clock.tai_s())
         first = prepare(frame, weather.on(target))
         runner = ends.enter_context(loop_runner())  # where the system denies even that, another start is refused too
-        outcome = _watched(runner, _run(frame, first, live, recording, weather))
+        outcome = _watched(runner, _run(frame, first, live, recording, weather, page))
         structlog.get_logger("run").info("run.done", **asdict(outcome))
     if not outcome.is_stopped:
         raise typer.Exit(1)
@@ -233,13 +241,19 @@ def _watched(runner: asyncio.Runner, run: Coroutine[Any, Any, Outcome]) -> Outco
 
 
 async def _run(
-    frame: RunSetup, first: Prepared, live: LiveLine | None, recording: RecordingWriter | None, weather: WeatherWatch
+    frame: RunSetup,
+    first: Prepared,
+    live: LiveLine | None,
+    recording: RecordingWriter | None,
+    weather: WeatherWatch,
+    page_frame: PageFrame,
 ) -> Outcome:
     clock, now = frame.clock, first
     tape: TapeFile | None = None
     notifier = Notifier()
     health = Health(notifier)
-    snapshot_ticks = SNAPSHOT_TICKS if live is None else 1
+    is_looked_at = live is not None or page_frame.choice is not None
+    snapshot_ticks = 1 if is_looked_at else SNAPSHOT_TICKS
     snapshots = SnapshotFile(frame.directory, frame.files, snapshot_ticks)
     elements = ElementsWatch(frame.config, frame.name, first.target, clock, frame.folders)
     section = first.target.station.elements
@@ -248,6 +262,7 @@ async def _run(
     def show(seen: Snapshot) -> None:
         health.see(seen)
         snapshots.write(seen)
+        page.see(seen)
         if live is not None:
             live.show(seen)
 
@@ -293,6 +308,7 @@ async def _run(
         )
 
     runs = Runs(begin)
+    page = RunningPage(page_frame, WatchedRuns(lambda: runs.service, runs.answer), clock)
     loop = asyncio.get_running_loop()
     loop.set_exception_handler(tell_loop_problem)
     ignored = take_signals(loop, runs.stop, tell_signal)
@@ -301,6 +317,7 @@ async def _run(
         structlog.get_logger("run").info("signals.ignored", signals=ignored, reason=reason)
     control = ControlSocket(frame.directory, runs.answer)
     await control.open()
+    await page.open()
     await weather.open()
     gc.freeze()  # a full collection over the start-up heap would stall a tick by tens of milliseconds
     sync = asyncio.create_task(clock.watch_synchronisation())
@@ -313,6 +330,7 @@ async def _run(
         if tape is not None:
             tape.close()
         await control.close()
+        await page.close()
         weather.close()
         notifier.close()
         if live is not None:

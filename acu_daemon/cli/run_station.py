@@ -32,6 +32,7 @@ async def run_station(setup: StationSetup, clock: SystemClock, first: Target, li
         loop.add_signal_handler(signal.SIGHUP, runs.day.ask_reload)
     control = ControlSocket(setup.directory, runs.answer)
     await control.open()
+    await runs.page.open()
     await runs.day.wind.open()
     sync = asyncio.create_task(clock.watch_synchronisation())
     try:
@@ -43,6 +44,7 @@ async def run_station(setup: StationSetup, clock: SystemClock, first: Target, li
     finally:
         sync.cancel()
         await control.close()
+        await runs.page.close()
         await runs.close()
         if live is not None:
             live.clear()

@@ -11,6 +11,7 @@ import structlog
 
 from acu_daemon.cli.kept import Kept, open_kept
 from acu_daemon.cli.options import Target
+from acu_daemon.cli.page import RunningPage, WatchedRuns, passes_shown
 from acu_daemon.cli.pass_tape import begin_tape
 from acu_daemon.cli.run_setup import make_job
 from acu_daemon.cli.station_day import StationDay
@@ -53,6 +54,8 @@ class StationRuns:
             check=setup.check,
             is_rehearsal=setup.clock.is_rehearsal,
         )
+        watched = WatchedRuns(lambda: self._service, self.answer, self._passes)
+        self.page = RunningPage(setup.page, watched, setup.clock)
         self._notifier = Notifier()
         self._health = Health(self._notifier)
         self._snapshots = SnapshotFile(setup.directory, setup.files, 1)
@@ -68,11 +71,19 @@ class StationRuns:
         self._horn = Horn(self.day.hooks, setup.clock)
         self._log: Any = structlog.get_logger("station")
 
+    def _passes(self) -> list[dict[str, Any]]:
+        return passes_shown(self.day.keeper.book, self.day.checks.said_of, self._setup.clock.tai_s())
+
     def stop(self, reason: str) -> None:
         """End early and safely."""
         self._stop_reason = self._stop_reason or reason
         if self._service is not None:
             self._service.stop(reason)
+
+    @property
+    def service(self) -> Service | None:
+        """The run that goes on; None: none has begun."""
+        return self._service
 
     def answer(self, line: str, who: str = "") -> str:
         """Answer a person's line (daemon.operator_verbs).  who: says it, and from where."""
@@ -259,6 +270,7 @@ class StationRuns:
     def _show(self, seen: Snapshot) -> None:
         self._health.see(seen)
         self._snapshots.write(seen)
+        self.page.see(seen)
         self.day.see(seen)
         self._obey_wind(seen)
         if self._live is not None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from acu_daemon.assist.session.refit import RefitReply, RefitRequest
 from acu_daemon.cli.options import Target, load_target
+from acu_daemon.cli.page import PageFrame
 from acu_daemon.cli.pass_checks import Check
 from acu_daemon.cli.station_wind import Beside
 from acu_daemon.config.load import satellite_names
@@ -31,6 +32,7 @@ class StationSetup:
     end_s: float
     is_shadow: bool
     older: tuple[Path, ...] = ()
+    page: PageFrame | None = None
     beside: Beside = asyncio.to_thread
     check: Check | None = None  # of a satellite at a TAI; None: as `acu-daemon check`
     make_runner: Callable[[PassJob], FitRunner] = lambda job: ProcessFitRunner(

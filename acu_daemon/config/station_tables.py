@@ -13,6 +13,7 @@ from acu_daemon.config.schedule_tables import ScheduleSection
 from acu_daemon.config.section import Name, Section
 from acu_daemon.config.station_day_tables import HooksSection, WindSection
 from acu_daemon.config.tracking_tables import ReadingsSection, ReceiverSection, TrackingSection
+from acu_daemon.config.web_tables import WebSection
 from acu_daemon.model import EarthOrientation, Site, Station
 from acu_daemon.pointing.envelope import Envelope
 from acu_daemon.pointing.mount import Mount
@@ -197,6 +198,7 @@ class StationFile(Section):
     recording: RecordingSection = Field(
         default=RecordingSection(), description="What is kept of every pass (docs/recordings.md)."
     )
+    web: WebSection = Field(default=WebSection(), description="The operator's page (docs/page.md).")
 
     @model_validator(mode="after")
     def _is_some_air(self) -> "StationFile":

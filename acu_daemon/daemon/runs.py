@@ -27,6 +27,11 @@ class Runs:
         self._stop_reason = self._stop_reason or reason
         self._service.stop(reason)
 
+    @property
+    def service(self) -> Service:
+        """The run that goes on."""
+        return self._service
+
     def answer(self, line: str, who: str = "") -> str:
         """Answer a line of the control socket."""
         return self._service.answer(line, who)

@@ -23,6 +23,7 @@ from acu_daemon.control.tracking.pass_plan import is_due, is_tracked, plan_pass,
 from acu_daemon.control.tracking.state_table import ACTIVE
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.background import Background
+from acu_daemon.daemon.drawing import DrawingBoard
 from acu_daemon.daemon.foreground import Foreground
 from acu_daemon.daemon.operator_requests import Hands
 from acu_daemon.daemon.port import AcuPort
@@ -38,6 +39,7 @@ from acu_daemon.model import FitResult, Pass, Reading
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.pointing.outage import kept_out, sun_outages
 from acu_daemon.pointing.reach import zenith_text
+from acu_daemon.units import Array
 
 FIRST_POLL_S = 10.0  # no good poll within this of the start ends the run
 LOOK_TICKS = 10
@@ -174,6 +176,7 @@ class Service:
             signal=None if self._signal is None else self._signal.now,
             note=note,
         )
+        self.drawing = DrawingBoard(self._area, job.control, job.refit, job.coming, clock)
         self._hands = Hands(self._area, job.control, self._foreground.ask, self.snapshot, clock.tai_s)
 
     def stop(self, reason: str) -> None:
@@ -358,6 +361,10 @@ class Service:
             is_rehearsal=self._job.is_rehearsal,
             files_alarm=self._files_alarm(),
         )
+
+    def lateness_ms(self, most: int) -> Array:
+        """How late the newest ticks came, at most so many, milliseconds."""
+        return self._foreground.lateness.newest_ms(most)
 
     def answer(self, line: str, who: str = "") -> str:
         """Answer a person's line (daemon.operator_verbs).  who: says it, and from where."""

@@ -3,7 +3,7 @@
 import asyncio
 import logging
 import sys
-from collections.abc import Callable, MutableMapping
+from collections.abc import Callable, Mapping, MutableMapping
 from functools import partial
 from typing import Any
 
@@ -26,17 +26,22 @@ def configure_logs(
     before_line: Callable[[], None] | None = None,
     writer: Writer | None = None,
     choice: str = "",
+    on_line: Callable[[Mapping[str, Any]], None] | None = None,
 ) -> None:
     """Set up the logs once.
 
     now_tai_s stamps every line with the daemon's own UTC; tags (SIMULATION, REHEARSAL) stand on every line; is_debug
     adds a line for each tick and fit; before_line clears the live line of a terminal first; writer prints the lines
-    beside the loop; choice: the options by which the commands that lines advise find this daemon.
+    beside the loop; on_line sees each; choice: the options by which the commands that lines advise find this
+    daemon.
     """
 
     def stamp(_logger: Any, _name: str, entry: Entry) -> Entry:
         said = {key: with_choice(value, choice) if isinstance(value, str) else value for key, value in entry.items()}
-        return {"utc": utc_text(now_tai_s()), **said, **tags}
+        line = {"utc": utc_text(now_tai_s()), **said, **tags}
+        if on_line is not None:
+            on_line(line)
+        return line
 
     def readable(_logger: Any, name: str, entry: Entry) -> str:
         if before_line is not None:
