@@ -21,6 +21,7 @@ LATCHED, FAULT = remembering(problem="azimuth stands still"), remembering(track=
 BOTH = remembering(LATCHED, track=TrackState.FAULT)
 LOOK = "ok armed, but latched: azimuth stands still; look at the antenna, then `acu-daemon clear`"
 AGAIN = "ok armed, but the ACU reports a fault: an emergency stop or an open door disarms again"
+STOPPED = "ok STOP goes out at once; the daemon is disarmed"
 DISARMED = "ok disarmed: STOP is sent if the daemon moves the antenna, then nothing"
 
 
@@ -40,6 +41,8 @@ def told(line: str, state: ControlState, *, is_shadow: bool = False) -> tuple[st
         ("arm", BOTH, LOOK, True),
         ("disarm", ControlState(), DISARMED, True),
         ("disarm", BOTH, DISARMED, True),
+        ("stop", ControlState(), STOPPED, True),
+        ("stop", BOTH, STOPPED, True),
         ("clear", BOTH, "ok cleared: azimuth stands still", True),
         ("clear", FAULT, "ok nothing is latched", False),
     ],
@@ -57,7 +60,7 @@ def test_a_shadow_is_asked_for_nothing(line: str, state: ControlState) -> None:
     assert told(line, state, is_shadow=True) == (refused, [])
 
 
-@pytest.mark.parametrize("line", ["", "ARM", "stop", "status now", "stow,"])
+@pytest.mark.parametrize("line", ["", "ARM", "stop!", "status now", "stow,"])
 def test_another_line_is_refused_with_what_is_expected(line: str) -> None:
     answer, asked = told(line, BOTH)
     assert answer == f"error {line!r} is unknown, expected status, {', '.join(VERBS)}"

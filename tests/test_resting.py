@@ -72,3 +72,21 @@ def test_an_antenna_that_somebody_else_moves_is_left_alone():
     flight = rest(40.0, script=[(10.0, somebody_steers)], antenna=RISING_ANTENNA)
     assert flight.rows[-1].mode is AcuMode.AUTOTRACK
     assert not [command for _, command in flight.commands if isinstance(command, Stop | SelectMode)]
+
+
+def test_a_stop_ends_the_rest_at_once_and_stops_an_antenna_that_somebody_else_moves():
+    def somebody_steers(access: ScriptAccess) -> None:
+        access.acu.answer(SelectMode(AcuMode.AUTOTRACK))
+
+    flight = rest(30.0, script=[(10.0, somebody_steers), (20.35, says("stop"))], antenna=RISING_ANTENNA)
+    stops = [tai_s for tai_s, command in flight.commands if isinstance(command, Stop)]
+    assert 0.0 <= stops[0] - T - 20.35 <= 0.2
+    assert len(stops) == 1
+    seen = flight.snapshots[-1]
+    assert (seen.arming, seen.is_stopping, flight.rows[-1].mode) == ("disarmed", False, AcuMode.STANDBY)
+    assert seen.stop_sent_utc < seen.stop_confirmed_utc
+
+
+def test_a_stop_of_a_disarmed_daemon_goes_out_too():
+    flight = rest(30.0, script=[(10.0, says("disarm")), (20.0, says("stop"))])
+    assert len([command for _, command in flight.commands if isinstance(command, Stop)]) == 1

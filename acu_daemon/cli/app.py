@@ -47,6 +47,7 @@ COMMANDS = {  # name: module of acu_daemon.cli, and the function in it
     "arm": ("operator_commands", "arm"),
     "disarm": ("operator_commands", "disarm"),
     "clear": ("operator_commands", "clear"),
+    "stop": ("operator_commands", "stop"),
     "stow": ("operator_commands", "stow"),
     "unstow": ("operator_commands", "unstow"),
     "reload": ("operator_commands", "reload"),

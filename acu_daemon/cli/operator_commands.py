@@ -1,4 +1,4 @@
-"""`acu-daemon arm`, `disarm`, `clear`, `stow`, `unstow`, `reload`, `status`: a word to the running daemon."""
+"""`acu-daemon arm`, `disarm`, `clear`, `stop`, `stow`, `unstow`, `reload`, `status`: a word to the running daemon."""
 
 from pathlib import Path
 from typing import Annotated
@@ -63,6 +63,17 @@ def clear(config: Config = None, state: State = None, rehearsal: Rehearsal = Fal
     Exit status: 0 cleared, or nothing was latched; 1 no daemon or no permission.
     """
     _say("clear", config, state, is_rehearsal=rehearsal)
+
+
+def stop(config: Config = None, state: State = None, rehearsal: Rehearsal = False) -> None:
+    """Stop the antenna now: STOP to the ACU at once, whoever moves it, then nothing but polls until `acu-daemon arm`.
+
+    A stow that is under way, the local panel and a fault are left alone: there STOP would disturb, or do nothing.  The
+    daemon itself goes on; SIGTERM ends it.
+
+    Exit status: 0 sent; 1 no daemon, no permission, or it runs with --shadow.
+    """
+    _say("stop", config, state, is_rehearsal=rehearsal)
 
 
 def stow(config: Config = None, state: State = None, rehearsal: Rehearsal = False) -> None:

@@ -17,6 +17,7 @@ class Request(StrEnum):
     ARM = "arm"
     DISARM = "disarm"
     CLEAR = "clear"
+    STOP = "stop"
 
 
 class StowBy(StrEnum):

@@ -15,6 +15,7 @@ from acu_daemon.acu.commands import (
     SelectBackup,
     SelectMode,
     SetWatchdog,
+    Stop,
     Stow,
     command_text,
 )
@@ -33,6 +34,7 @@ from acu_daemon.daemon.decider import Decider
 from acu_daemon.daemon.line_watch import LineWatch
 from acu_daemon.daemon.motion import Motion
 from acu_daemon.daemon.port import AcuPort, Answer
+from acu_daemon.daemon.stop_times import StopTimes
 from acu_daemon.daemon.stopping import DEADLINE_S, stop_antenna
 from acu_daemon.daemon.tick_lateness import Lateness
 from acu_daemon.edge.clock import Clock
@@ -91,14 +93,19 @@ class Foreground:
         self.clock_watch = ClockWatch(clock, config.clock_alarm_deg)
         self.lateness = Lateness()
         self.motion = Motion()
+        self.stop_times = StopTimes()
 
     async def run(self) -> None:
         """Tick at the tenths of UTC seconds; a late tick is counted and skipped, never sent in a burst."""
         period_s, log = self._config.period_s, self._log.bind()
-        due_tai_s = math.ceil(self._clock.tai_s() / period_s + FIRST_SHARE) * period_s
-        ticks = 1
+        due_tai_s = (math.ceil(self._clock.tai_s() / period_s + FIRST_SHARE) - 1) * period_s
+        ticks, is_rest = 1, False
         while True:
-            await self._clock.sleep_until(due_tai_s)
+            if is_rest:
+                due_tai_s = await self._rest(due_tai_s, ticks)
+            else:
+                due_tai_s = round(due_tai_s / period_s + ticks) * period_s
+                await self._clock.sleep_until(due_tai_s)
             late_s = self._clock.tai_s() - due_tai_s
             self.lateness.add(late_s)
             self.tick_count += 1
@@ -113,9 +120,19 @@ class Foreground:
                 missed += 1  # two writes that near to each other would be a burst
             if self._config.acu.reply_deadline_s <= period_s:  # else it is polled as fast as it answers
                 self.skipped_tick_count += missed
-            ticks = max(1 + missed, round(REST_S / period_s)) if self._may_rest() else 1 + missed
-            due_tai_s = round(due_tai_s / period_s + ticks) * period_s
+            is_rest = self._may_rest()
+            ticks = max(1 + missed, round(REST_S / period_s)) if is_rest else 1 + missed
             log.debug("tick", late_ms=1e3 * late_s, skipped=missed, status=self._area.state.intake.status)
+
+    async def _rest(self, from_tai_s: float, ticks: int) -> float:
+        """Sleep over so many ticks, until a person says a word: a STOP shall not wait.  Returns the due one, TAI s."""
+        period_s, due_tai_s = self._config.period_s, from_tai_s
+        for tick_number in range(1, ticks + 1):
+            due_tai_s = round(from_tai_s / period_s + tick_number) * period_s
+            await self._clock.sleep_until(due_tai_s)
+            if self._requests and self._clock.tai_s() - due_tai_s < LATE_SHARE * period_s:
+                break
+        return due_tai_s
 
     def _may_rest(self) -> bool:
         """Whether there is nothing to do but to see, once in a while, that the antenna still stands."""
@@ -198,6 +215,8 @@ class Foreground:
         if order:
             self._note(("D", order))
         answer = await self._port.exchange(command)
+        if isinstance(command, Stop):
+            self.stop_times = self.stop_times.after(answer.started_tai_s, answer.first_byte_tai_s, answer.reply)
         if isinstance(command, PointAndPoll | Poll) and answer.reply is not None and not self._port.no_contact:
             self._status_s = self._clock.monotonic_s()
         if isinstance(command, PointAndPoll) and isinstance(answer.reply, AcuStatus):

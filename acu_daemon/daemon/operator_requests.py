@@ -71,6 +71,7 @@ class Hands:
         return {
             Request.ARM: "ok armed",
             Request.DISARM: "ok disarmed: STOP is sent if the daemon moves the antenna, then nothing",
+            Request.STOP: "ok STOP goes out at once; the daemon is disarmed",
             Request.CLEAR: f"ok cleared: {state.latch.problem}",
         }[request]
 

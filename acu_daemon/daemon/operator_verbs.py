@@ -36,6 +36,7 @@ VERBS: Mapping[str, OperatorVerb] = {
     for verb in (
         OperatorVerb("arm", "let the daemon move the antenna"),
         OperatorVerb("disarm", "STOP if the daemon moves the antenna, then nothing but polls"),
+        OperatorVerb("stop", "STOP to the ACU at once, whoever moves the antenna, then nothing but polls until `arm`"),
         OperatorVerb("clear", "clear the latch of an axis"),
         OperatorVerb("stow", "send the antenna to its stow position, and keep it there until `unstow`"),
         OperatorVerb("unstow", "end a stow, whoever's it is; the antenna leaves it when a pass is near"),

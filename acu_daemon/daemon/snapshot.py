@@ -93,6 +93,8 @@ class Snapshot:
     acu_mode: str = ""
     acu_faults: str = ""  # as the ACU named them
     is_stopping: bool = False  # a STOP was sent and is not acknowledged
+    stop_sent_utc: str = ""  # when the newest STOP went out
+    stop_confirmed_utc: str = ""  # when the ACU acknowledged it
     rise_utc: str = ""
     set_utc: str = ""
     rise_in_s: float | None = None  # negative: the pass has begun

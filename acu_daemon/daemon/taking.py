@@ -76,6 +76,8 @@ def take_snapshot(
         acu_mode=state.intake.status.mode.name if state.intake.status else "",
         acu_faults=foreground.acu_faults if state.tracking.track is TrackState.FAULT else "",
         is_stopping=state.arming.is_stop_due,
+        stop_sent_utc=_utc(foreground.stop_times.sent_tai_s),
+        stop_confirmed_utc=_utc(foreground.stop_times.confirmed_tai_s),
         rise_utc=utc_text(coming.rise_tai_s, 0) if coming else "",
         set_utc=utc_text(coming.set_tai_s + late_s, 0) if coming else "",
         rise_in_s=coming.rise_tai_s - now_tai_s if coming else None,
@@ -153,6 +155,10 @@ def _seen(
         rejecting=area.gate.rejecting if state.tracking.track in AUTOTRACKING else "",
         rejected_counts=area.rejected_counts,
     )
+
+
+def _utc(tai_s: float | None) -> str:
+    return utc_text(tai_s) if tai_s is not None else ""
 
 
 def _zenith(sky: Sky, now_tai_s: float) -> str:

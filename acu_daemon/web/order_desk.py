@@ -18,7 +18,7 @@ from acu_daemon.daemon.write_lease import WriteLease
 from acu_daemon.web.guard import Allowance, Seals
 
 UNLOCKED_S = 30.0
-STOP_LINE = "disarm"
+STOP_LINE = "stop"
 MOST_VALUES = 8
 _WORD = re.compile(r"[a-z][a-z0-9_]{0,30}")
 _VALUE = re.compile(r"[A-Za-z0-9:+./_-]{1,60}")

@@ -49,4 +49,7 @@ def obey(state: ControlState, requests: Iterable[Asking], config: ControlConfig,
         elif request is Request.DISARM and state.is_armed_by_people(config):
             is_ours = state.registers.in_force is not None or state.foreign_stop.held is not None  # of one killed
             state = owe_stop(disarm(state, "a person", events), is_due=is_stop_due or is_ours)
+        elif request is Request.STOP and not config.is_shadow:  # whoever moves it
+            is_armed = state.is_armed_by_people(config)
+            state = owe_stop(disarm(state, "a person", events) if is_armed else state)
     return state

@@ -9,7 +9,7 @@ const WAIT_MS = 2000;
 let stopped = null; // the press that is being shown
 function pressStop(event) {
   if (!event.isTrusted) return; // nothing but a hand stops: no script, no page that is loaded again
-  const pressed = { at: performance.now(), id: `stop ${++replyNumber}`, said: "", confirmed: 0 };
+  const pressed = { at: performance.now(), id: `stop ${++replyNumber}`, said: "", before: now?.stop_sent_utc ?? "" };
   stopped = pressed;
   let isOut = false;
   if (line?.readyState === WebSocket.OPEN) {
@@ -40,20 +40,19 @@ function heardStop(pressed, text, ok) {
 const after = (ms) => ` after ${(ms / 1000).toFixed(2)} s`;
 function watchStop(now) {
   if (!stopped?.ok || stopped.isOver) return;
-  let text = stopped.said;
-  if (now.arming === "disarmed" && !now.is_stopping) {
-    stopped.confirmed ||= performance.now();
-    text += ` \u2014 the ACU confirms${after(stopped.confirmed - stopped.at)}`;
-    const stands = now.speed_deg_s !== null && now.speed_deg_s < 0.2;
-    if (stands) {
-      stopped.stood ||= performance.now();
-      text += ` \u2014 the antenna stands${after(stopped.stood - stopped.at)}. It stays disarmed until somebody arms it.`;
-    } else text += " \u2014 it still moves";
-  } else if (now.arming === "armed" && performance.now() - stopped.at > WAIT_MS) {
+  if (now.arming === "armed" && performance.now() - stopped.at > WAIT_MS) { // somebody has armed it since
     stopped.isOver = true;
-    sayStop("");
-    return;
-  } else text += " \u2014 the ACU has not confirmed yet";
+    return sayStop("");
+  }
+  const isNew = now.stop_sent_utc && now.stop_sent_utc !== stopped.before;
+  let text = stopped.said;
+  if (isNew) text += ` \u2014 on the wire ${now.stop_sent_utc.slice(11, 23)}`;
+  if (isNew && now.stop_confirmed_utc) {
+    text += ` \u2014 the ACU confirms ${now.stop_confirmed_utc.slice(11, 23)}`;
+    const stands = now.speed_deg_s !== null && now.speed_deg_s < 0.2;
+    if (stands) stopped.stood ||= performance.now();
+    text += stands ? ` \u2014 the antenna stands${after(stopped.stood - stopped.at)}. It stays disarmed until somebody arms it.` : " \u2014 it still moves";
+  } else text += now.is_stopping || isNew ? " \u2014 the ACU has not confirmed yet" : "";
   sayStop(text);
 }
 function sayStop(text) {

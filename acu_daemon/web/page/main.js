@@ -69,6 +69,7 @@ function draw(said) {
     drawTimeline(now, state.backdrop, state.states, state.ahead);
     showTicks(now);
     showCountdowns(now, state.backdrop, state.ahead, 0);
+    if (!state.schedule.length) showSchedule([], now);
   }
   window.acuShown = window.acuSeen;
 }

@@ -87,7 +87,7 @@ function showFigures(now, back, silent) {
     ["prediction", predictionText(now)],
     ["correction", now.along_s === null ? "no fit yet" : `${Math.abs(now.along_s).toFixed(2)} s ${now.along_s < 0 ? "early" : "late"}, ${signed(now.across_deg, 3)} deg across`],
     ["sun", now.sun_deg === null ? "" : `${now.sun_deg.toFixed(1)} deg from the beam`],
-    ["crossing", now.zenith], ["search", now.search], ["not fitted", now.rejecting], ["elements", now.elements + (now.elements_problem ? `; ${now.elements_problem}` : "")],
+    ["crossing", now.zenith.replace(/\d{4}-\d\d-\d\dT(\d\d:\d\d:\d\d)Z/g, "$1")], ["search", now.search], ["not fitted", now.rejecting], ["elements", now.elements + (now.elements_problem ? `; ${now.elements_problem}` : "")],
     ["ACU", `${now.acu_mode || "-"}, ${now.arming}${now.disarmed_by ? ` by ${now.disarmed_by}` : ""}`],
   ]);
 }
