@@ -87,13 +87,13 @@ def test_what_a_full_disk_refused_is_saved_with_the_next_change(tmp_path):
     book = first_book()
     with ScheduleFile(tmp_path) as file:
         file.save(book[:1], DAY)
-        pages = file._db.execute("pragma page_count").fetchone()[0]
-        file._db.execute(f"pragma max_page_count = {pages}")
+        pages = file._written.execute("pragma page_count").fetchone()[0]
+        file._written.execute(f"pragma max_page_count = {pages}")
         many = [replace(book[1], number=2 + at, reason="x" * 4000) for at in range(20)]
         file.save(many, DAY)
         assert "full" in file.problem
         assert len(file.book(DAY)) == 1
-        file._db.execute("pragma max_page_count = 10000")
+        file._written.execute("pragma max_page_count = 10000")
         file.save([], DAY)
         assert file.problem == ""
         assert len(file.book(DAY)) == 21

@@ -1,4 +1,4 @@
-"""`acu-daemon arm`, `disarm`, `clear`, `stop`, `stow`, `unstow`, `reload`, `status`: a word to the running daemon."""
+"""`acu-daemon arm`, `disarm`, `clear`, `stow`, `nudge` and all that people say to the running daemon."""
 
 from pathlib import Path
 from typing import Annotated
@@ -26,9 +26,15 @@ Config = Annotated[
 ]
 Rehearsal = Annotated[bool, typer.Option("--rehearsal", help="The daemon that runs as a rehearsal (--at).")]
 
+Satellite = Annotated[str | None, typer.Option("--satellite", metavar="NAME", help="Whose pass.")]
+At = Annotated[str | None, typer.Option("--at", metavar="UTC", help="A time at which it is up.")]
+Named = Annotated[str, typer.Option("--satellite", metavar="NAME", help="Whose pass.")]
+Time = Annotated[str, typer.Option("--at", metavar="UTC", help="A time at which it is up.")]
 
-def _say(word: str, config: Path | None, state: Path | None, *, is_rehearsal: bool) -> None:
-    answer = ask(find_daemon(word, config, state, is_rehearsal=is_rehearsal), word)
+
+def _say(line: str, config: Path | None, state: Path | None, *, is_rehearsal: bool) -> None:
+    word = line.split(" ")[0]
+    answer = ask(find_daemon(word, config, state, is_rehearsal=is_rehearsal), line)
     typer.echo(with_choice(answer, choice_text(config, state, is_rehearsal=is_rehearsal)))
 
 
@@ -96,6 +102,78 @@ def unstow(config: Config = None, state: State = None, rehearsal: Rehearsal = Fa
     Exit status: 0; 1 refused, no daemon or no permission.
     """
     _say("unstow", config, state, is_rehearsal=rehearsal)
+
+
+def hold(config: Config = None, state: State = None, rehearsal: Rehearsal = False) -> None:
+    """Leave autotrack, and have the antenna follow the prediction, to the end of the pass or until `acu-daemon track`.
+
+    Exit status: 0; 1 no pass is on, disarmed, no daemon or no permission.
+    """
+    _say("hold", config, state, is_rehearsal=rehearsal)
+
+
+def track(config: Config = None, state: State = None, rehearsal: Rehearsal = False) -> None:
+    """End a `hold`: autotrack is selected again on the path.
+
+    Exit status: 0; 1 no pass is on, disarmed, no daemon or no permission.
+    """
+    _say("track", config, state, is_rehearsal=rehearsal)
+
+
+def nudge(
+    config: Config = None,
+    state: State = None,
+    rehearsal: Rehearsal = False,
+    along_s: Annotated[
+        float | None,
+        typer.Option("--along-s", metavar="S", help="Seconds late: -60 to 60.  Left out: as it is."),
+    ] = None,
+    across_deg: Annotated[
+        float | None,
+        typer.Option("--across-deg", metavar="DEG", help="Right of the motion, degrees: -5 to 5.  Left out: as it is."),
+    ] = None,
+    keep: Annotated[
+        bool,
+        typer.Option("--keep", help="The satellite's next passes begin with it too, while these elements hold."),
+    ] = False,
+) -> None:
+    """Move the path that the antenna is led along: in all so many seconds late, and degrees across.
+
+    Both 0 undo it.  It ends with the pass, and when a fit makes the path anew; autotrack goes where the signal is.
+
+    Exit status: 0; 1 no pass is on, disarmed, no daemon or no permission.
+    """
+    given = {"along_s": along_s, "across_deg": across_deg, "keep": "yes" if keep else None}
+    words = [f"{name}={value}" for name, value in given.items() if value is not None]
+    _say(" ".join(["nudge", *words]), config, state, is_rehearsal=rehearsal)
+
+
+def skip(
+    config: Config = None, state: State = None, rehearsal: Rehearsal = False, satellite: Satellite = None, at: At = None
+) -> None:
+    """Give a pass up: the one of --satellite at --at, else the one that is on, with a safe stop, else the next one.
+
+    Of a running station (`run` without --satellite).  `unskip` withdraws it; where none runs, `schedule --exclude` is
+    for the same.
+
+    Exit status: 0; 1 refused, no station or no permission.
+    """
+    _say(_about_pass("skip", satellite, at), config, state, is_rehearsal=rehearsal)
+
+
+def unskip(
+    satellite: Named, at: Time, config: Config = None, state: State = None, rehearsal: Rehearsal = False
+) -> None:
+    """Withdraw a word about a pass: it is tracked or not as the plan says.
+
+    Exit status: 0; 1 refused, no station or no permission.
+    """
+    _say(_about_pass("unskip", satellite, at), config, state, is_rehearsal=rehearsal)
+
+
+def _about_pass(verb: str, satellite: str | None, at: str | None) -> str:
+    given = {"satellite": satellite, "at": at}
+    return " ".join([verb, *(f"{name}={value}" for name, value in given.items() if value is not None)])
 
 
 def reload(config: Config = None, state: State = None, rehearsal: Rehearsal = False) -> None:

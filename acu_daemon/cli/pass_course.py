@@ -18,6 +18,15 @@ DEGRADED_SHARE = 0.5  # of the useful seconds with the signal
 NO_SIGNAL = "no signal: the satellite was silent, or not where it should be"
 
 
+@dataclass(frozen=True, slots=True)
+class KeptNudge:
+    """What a person moves a satellite's path by, s late and deg right, and the elements for which that holds."""
+
+    along_s: float
+    across_deg: float
+    elements: str
+
+
 @dataclass(slots=True)
 class Tracked:
     """What was seen of the pass that is on."""
@@ -29,6 +38,9 @@ class Tracked:
     last_tai_s: float = math.nan
     words: list[str] = field(default_factory=list)  # what else there is to say of it, each once
     hooks: list[HookResult] = field(default_factory=list)
+    cancelled_by: str = ""
+    nudge: KeptNudge | None = None  # in force now
+    is_nudge_kept: bool = False
 
     def note(self, word: str) -> None:
         """Remember something to say."""
@@ -44,6 +56,7 @@ class PassCourse:
         self._tracked = Tracked()
         self._alarms: frozenset[str] = frozenset()
         self.entry: Entry | None = None
+        self._nudges: dict[str, KeptNudge] = {}  # of satellites, until the process ends
         self._log: Any = structlog.get_logger("station")
 
     def begun(self, entry: Entry) -> None:
@@ -73,6 +86,11 @@ class PassCourse:
 
     def _see_pass(self, entry: Entry, seen: Snapshot) -> None:
         tracked = self._tracked
+        is_nudged = seen.nudge_along_s != 0.0 or seen.nudge_across_deg != 0.0
+        nudge = KeptNudge(seen.nudge_along_s, seen.nudge_across_deg, seen.elements)
+        tracked.nudge = nudge if is_nudged else None
+        if seen.is_held_by_person:
+            tracked.note("held by a person")
         if seen.stow_by:
             tracked.note(f"stowed by the {seen.stow_by}")
         if entry.state is PassState.PREPASS and seen.rise_in_s is not None and seen.rise_in_s <= 0.0:
@@ -92,6 +110,7 @@ class PassCourse:
         if self.entry is None:
             return
         entry = self._keeper.change(self.entry, PassState.POSTPASS, "")
+        self._keep_nudge(entry.satellite)
         state, why = self._judged(entry, outcome, reason)
         changed = self._keeper.change(entry, state, why)
         self._hooks.end_during()
@@ -100,9 +119,33 @@ class PassCourse:
         self._log.info("pass.done", entry=changed.name, state=str(state), reason=why)
         self.entry = None
 
+    # People
+
+    def cancel(self, who: str) -> None:
+        """A person gives the pass up."""
+        self._tracked.cancelled_by = who or "a person"
+
+    def keep_nudge(self) -> None:
+        """The nudge that is in force at the end begins the satellite's next passes too."""
+        self._tracked.is_nudge_kept = True
+
+    def nudge_for(self, satellite: str, elements: str) -> KeptNudge | None:
+        """What a pass begins with; None: other elements are in force, or nothing was kept."""
+        kept = self._nudges.get(satellite)
+        return kept if kept is not None and kept.elements == elements else None
+
+    def _keep_nudge(self, satellite: str) -> None:
+        tracked = self._tracked
+        if tracked.is_nudge_kept and tracked.nudge is not None:
+            self._nudges[satellite] = tracked.nudge
+        elif tracked.is_nudge_kept or tracked.nudge is None:  # undone, or what it mended is in a fit
+            self._nudges.pop(satellite, None)
+
     def _judged(self, entry: Entry, outcome: Outcome | None, reason: str) -> tuple[PassState, str]:
         if outcome is None:
             return PassState.FAILED, reason
+        if self._tracked.cancelled_by:
+            return PassState.CANCELLED, f"skipped by {self._tracked.cancelled_by}"
         tracked, words = self._tracked, "; ".join(self._tracked.words)
         cause = words or "; ".join(sorted(self._alarms))
         if not tracked.is_told_of_signal:

@@ -3,7 +3,6 @@
 import getpass
 import json
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,7 +18,7 @@ from acu_daemon.edge.state_directory import antenna_directory, state_directory, 
 from acu_daemon.errors import UsageError
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.report.calendar import calendar_text
-from acu_daemon.schedule.book import Entry, PassState, merged
+from acu_daemon.schedule.book import Entry, PassState, merged, paused
 from acu_daemon.schedule.rules import PassRequest, Wish
 from acu_daemon.units import DAY_S
 
@@ -124,14 +123,6 @@ def pause(
     with ScheduleFile(_made(load_station(config), state, is_rehearsal=rehearsal)) as file:
         file.pause(until_tai_s, now_tai_s, getpass.getuser())
     typer.echo("the pause is over" if end else f"no pass is begun until {utc_text(until_tai_s, 0)}")
-
-
-def paused(entry: Entry, until_tai_s: float) -> Entry:
-    """An entry as a pause leaves it."""
-    if entry.state is not PassState.PLANNED or entry.start_tai_s is None or entry.start_tai_s >= until_tai_s:
-        return entry
-    reason = f"paused by a person until {utc_text(until_tai_s, 0)}"
-    return replace(entry, state=PassState.CANCELLED, reason=reason)
 
 
 def as_record(entry: Entry) -> dict[str, Any]:

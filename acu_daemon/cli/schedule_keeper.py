@@ -17,7 +17,7 @@ from acu_daemon.config.station_tables import StationFile
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.schedule_file import ScheduleFile, Words
 from acu_daemon.errors import AcuDaemonError
-from acu_daemon.schedule.book import UNDER_WAY, Entry, PassState, merged
+from acu_daemon.schedule.book import UNDER_WAY, Entry, PassState, merged, paused
 from acu_daemon.schedule.decisions import RESUMED
 from acu_daemon.schedule.exact_plan import Slot
 from acu_daemon.schedule.rules import PassRequest, Wish
@@ -69,6 +69,7 @@ class ScheduleKeeper:
         if words != self.words:
             self.words = words
             self.anew_reason = WORD
+        self._cancel_paused(now_tai_s)
         if self._planning is not None:
             if self._planning.done():
                 done, self._planning = self._planning, None
@@ -88,6 +89,13 @@ class ScheduleKeeper:
                 self._put_off(now_tai_s)
                 return
         self._planning = asyncio.create_task(self._beside(self._plan, now_tai_s), name="plan")
+
+    def _cancel_paused(self, now_tai_s: float) -> None:
+        """Of a pass that a pause is over, and of which half is gone, nothing is tracked any more."""
+        gone = [one for one in self.book if (one.rise_tai_s + one.set_tai_s) / 2.0 < now_tai_s]
+        for one in gone:
+            if (after := paused(one, self.words.pause_until_tai_s)) is not one:
+                self.change(one, after.state, after.reason)
 
     def _put_off(self, now_tai_s: float) -> None:
         self.anew_reason, self._planned_tai_s = "", now_tai_s
@@ -136,6 +144,14 @@ class ScheduleKeeper:
         """The granted passes that begin after a time, in words."""
         later = [one for one in self.book if one.state is PassState.PLANNED and one.rise_tai_s > after_tai_s]
         return tuple(next_text(one.satellite, one.rise_tai_s, one.culmination_el_deg) for one in later[:SHOWN_COUNT])
+
+    def say(self, request: PassRequest, who: str) -> None:
+        """Take a person's word about a pass; it is planned anew by it."""
+        self._file.say(request, self._clock.tai_s(), who)
+
+    def pause(self, until_tai_s: float, who: str) -> None:
+        """Begin no pass until a time; NO_PAUSE ends a pause."""
+        self._file.pause(until_tai_s, self._clock.tai_s(), who)
 
     def change(self, entry: Entry, state: PassState, reason: str) -> Entry:
         """Put a pass into another state, and save it."""

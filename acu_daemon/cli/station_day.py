@@ -54,7 +54,7 @@ class StationDay:
     ) -> None:
         """beside: does what takes long, beside the loop.  check: what of a pass is a no-go; None: files and ACU."""
         self._is_rehearsal = is_rehearsal
-        self._config, self._clock, self._directory = config, clock, file.path.parent
+        self.config, self._clock, self._directory = config, clock, file.path.parent
         self._files = ConfigurationWatch(config)
         self._good: dict[str, Target] = {}  # satellites as they could be used last
         self._log: Any = structlog.get_logger("station")
@@ -125,7 +125,7 @@ class StationDay:
     def _no_gos(self, satellite: str, now_tai_s: float) -> list[str]:
         return [
             f"{one.what}: {one.detail}"
-            for one in findings(self._config, satellite, now_tai_s, self._directory)
+            for one in findings(self.config, satellite, now_tai_s, self._directory)
             if one.verdict == NO_GO
         ]
 
@@ -145,11 +145,9 @@ class StationDay:
         now_tai_s = self._clock.tai_s()
         at_tai_s = max(entry.rise_tai_s, now_tai_s)
         try:
-            target = load_target(
-                self._config, entry.satellite, now_tai_s, at_tai_s=at_tai_s, folders=(self._directory,)
-            )
+            target = load_target(self.config, entry.satellite, now_tai_s, at_tai_s=at_tai_s, folders=(self._directory,))
             self._good[entry.satellite] = target
-            keep_confirmed(self._config, target)
+            keep_confirmed(self.config, target)
         except AcuDaemonError as error:
             if entry.satellite not in self._good:
                 raise

@@ -15,15 +15,15 @@ from acu_daemon.cli.page import RunningPage, WatchedRuns, passes_shown
 from acu_daemon.cli.pass_tape import begin_tape
 from acu_daemon.cli.run_setup import make_job
 from acu_daemon.cli.station_day import StationDay
+from acu_daemon.cli.station_hand import StationHand
 from acu_daemon.cli.station_move import IN_PLACE, Horn, move_job, why_move_ends
 from acu_daemon.cli.station_setup import NoFits, StationSetup
 from acu_daemon.cli.weather_watch import WeatherWatch
 from acu_daemon.control.safety.stow import end_between_passes
 from acu_daemon.control.state import ControlState
-from acu_daemon.control.tick_input import StowWish
+from acu_daemon.control.tick_input import Asking, NudgeWish, StowWish
 from acu_daemon.daemon.health import Health
 from acu_daemon.daemon.live import LiveLine
-from acu_daemon.daemon.operator_requests import tell
 from acu_daemon.daemon.service import Outcome, PassJob, Service
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.daemon.stopping import DEADLINE_S
@@ -48,7 +48,7 @@ class StationRuns:
         self.day = StationDay(
             setup.config,
             setup.clock,
-            ScheduleFile(setup.directory),
+            ScheduleFile(setup.directory, put=setup.put),
             first.station,
             beside=setup.beside,
             check=setup.check,
@@ -66,8 +66,10 @@ class StationRuns:
         self._memory: ControlState | None = None
         self._stop_reason = ""
         self._is_resting = False
+        self._first_ask: Asking | None = None  # what the first tick of the next run is asked for
         self._is_placed = True  # where it waits after a pass
         self._move_until_tai_s = math.inf
+        self._hand = StationHand(self.day, setup.clock.tai_s)
         self._horn = Horn(self.day.hooks, setup.clock)
         self._log: Any = structlog.get_logger("station")
 
@@ -87,14 +89,7 @@ class StationRuns:
 
     def answer(self, line: str, who: str = "") -> str:
         """Answer a person's line (daemon.operator_verbs).  who: says it, and from where."""
-        if self._service is None:
-            return "error the station starts"
-        name = line.split(" ")[0]
-        if name == "reload":
-            return tell(line=line, who=who, answer=self.day.ask_reload())
-        if name == "unstow" and (why := self.day.why_not_unstow()):
-            return tell(line=line, who=who, answer=f"error {why}")
-        return self._service.answer(line, who)
+        return self._hand.answer(line, who, self._service)
 
     async def run(self) -> Outcome:
         """Run until it is stopped.  Raises: NoAcuError: no good poll at the start."""
@@ -179,6 +174,8 @@ class StationRuns:
         job = replace(job, end_tai_s=min(job.end_tai_s, entry.end_tai_s)) if is_cut else job
         if self._memory is None:  # the first of this process: as one of a single pass is resumed
             job = replace(job, state=end_between_passes(self._kept.state), is_anew=False)
+        if (kept := self.day.course.nudge_for(entry.satellite, job.elements)) is not None:
+            self._first_ask = NudgeWish(kept.along_s, kept.across_deg)
         self._horn.forget()
         self.day.begun(entry)
         self._is_placed = False
@@ -248,6 +245,9 @@ class StationRuns:
             note=self._tape.note if is_pass and self._tape is not None else no_note,
         )
         self._service, self._is_resting = service, job.control.is_resting
+        if self._first_ask is not None:
+            service.ask(self._first_ask)
+            self._first_ask = None
         if self._stop_reason:
             service.stop(self._stop_reason)
         outcome = await service.run()

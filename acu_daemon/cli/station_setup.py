@@ -16,7 +16,7 @@ from acu_daemon.daemon.service import PassJob
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.fit import FitRunner, ProcessFitRunner
 from acu_daemon.edge.link import Link
-from acu_daemon.edge.writer import Writer
+from acu_daemon.edge.writer import Job, Writer
 from acu_daemon.errors import AcuDaemonError, UsageError
 
 
@@ -34,6 +34,7 @@ class StationSetup:
     older: tuple[Path, ...] = ()
     page: PageFrame | None = None
     beside: Beside = asyncio.to_thread
+    put: Callable[[Job], object] = lambda job: job()  # writes the schedule: by a queue, where the loop must not wait
     check: Check | None = None  # of a satellite at a TAI; None: as `acu-daemon check`
     make_runner: Callable[[PassJob], FitRunner] = lambda job: ProcessFitRunner(
         job.refit, fit_deadline_s(job.low_water_s)

@@ -204,6 +204,23 @@ class Signal:
 
 
 @dataclass(frozen=True, slots=True)
+class Nudge:
+    """What a person moves the path by, late and right positive, and of which model it is; None: of the first one."""
+
+    along_s: float
+    across_deg: float
+    model: Model | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ByHand:
+    """What a person changes of how this pass is steered.  Owner: control.tracking.by_hand."""
+
+    is_held: bool = False  # autotrack is left for the prediction
+    nudge: Nudge | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Scan:
     """How far SEARCH has come (control.tracking.scan): what each row covers, early to late, s; where it looks now."""
 
@@ -268,6 +285,7 @@ class ControlState:
     asked: Asked = Asked()
     tracking: Tracking = Tracking()
     signal: Signal = Signal()
+    by_hand: ByHand = ByHand()
     search: Search = Search()
     false_lock: FalseLock = FalseLock()
     lag: Lag = Lag()

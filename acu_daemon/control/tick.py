@@ -31,6 +31,7 @@ from acu_daemon.control.startup import after_reply, watch_for_power_cycle
 from acu_daemon.control.state import ControlState, StartStage
 from acu_daemon.control.tick_input import TickInput
 from acu_daemon.control.tracking.aim import aim
+from acu_daemon.control.tracking.by_hand import steer_by_hand
 from acu_daemon.control.tracking.false_lock import watch_lock
 from acu_daemon.control.tracking.learned_lag import learn_lag
 from acu_daemon.control.tracking.path_offset import drop_unusable_offset, forget_other_pass, learn_of_signal
@@ -55,6 +56,7 @@ def tick(state: ControlState, given: TickInput, config: ControlConfig) -> tuple[
     state = take_in(state, given, config, events)
     state = supervise(before, state, given.seen, config, events)
     state = watch_lock(state, given, config, events)
+    state = steer_by_hand(state, given, config, events)
     state = note_held(walk(forget_other_pass(state, given.sky), given, config, events), config)
     state = learn_of_signal(state, given, config, events)
     state = search(before, state, given, config, events)

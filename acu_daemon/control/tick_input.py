@@ -41,7 +41,22 @@ class StowWish:
     is_wanted: bool = True
 
 
-Asking = Request | StowWish
+@dataclass(frozen=True, slots=True)
+class HoldWish:
+    """Leave autotrack and follow the prediction, or give the antenna back to autotrack."""
+
+    is_wanted: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class NudgeWish:
+    """Move the path: so many seconds late and degrees right of the motion in all; both 0: not at all."""
+
+    along_s: float
+    across_deg: float
+
+
+Asking = Request | StowWish | HoldWish | NudgeWish
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ Command line, page and other programs' ports all come through `Hands.answer`; da
 """
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -12,7 +12,7 @@ import structlog
 
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.stow import why_not_sent
-from acu_daemon.control.tick_input import Asking, Request, StowBy, StowWish
+from acu_daemon.control.tick_input import Asking, HoldWish, NudgeWish, Request, StowBy, StowWish
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.operator_verbs import Said, understood
@@ -56,8 +56,16 @@ class Hands:
             return f"error {verb.name}: only a station has it, `acu-daemon run` without --satellite"
         if self._control.is_shadow:
             return f"error this daemon runs with --shadow: it commands nothing, so there is nothing to {verb.name}"
-        answer = self._stow(verb.name) if verb.name in ("stow", "unstow") else self._request(Request(verb.name))
-        return tell(line=verb.name, who=who, answer=answer)
+        match verb.name:
+            case "stow" | "unstow":
+                answer = self._stow(verb.name)
+            case "hold" | "track":
+                answer = self._hold(is_wanted=verb.name == "hold")
+            case "nudge":
+                answer = self._nudge(said.figures)
+            case _:
+                answer = self._request(Request(verb.name))
+        return tell(line=said.line, who=who, answer=answer)
 
     def _request(self, request: Request) -> str:
         state = self._area.state
@@ -84,6 +92,35 @@ class Hands:
             return f"error not stowed: {why}"
         self._ask(StowWish(StowBy.OPERATOR))
         return "ok stowed: the ACU goes to its stow position; `acu-daemon unstow` ends it"
+
+    def _hold(self, *, is_wanted: bool) -> str:
+        if not self._control.has_signal:
+            return "ok the prediction is followed already: no signal is waited for"
+        if why := self._why_not_steered():
+            return f"error {why}"
+        self._ask(HoldWish(is_wanted))
+        if is_wanted:
+            return "ok held: autotrack is left, the prediction is followed; `acu-daemon track` ends it, or the pass"
+        return "ok autotrack is selected again"
+
+    def _nudge(self, figures: Mapping[str, float]) -> str:
+        if not figures:
+            return "error nudge: expected along_s=, across_deg= or both"
+        if why := self._why_not_steered():
+            return f"error {why}"
+        now = self._area.state.by_hand.nudge
+        along_s = figures.get("along_s", now.along_s if now else 0.0)
+        across_deg = figures.get("across_deg", now.across_deg if now else 0.0)
+        self._ask(NudgeWish(along_s, across_deg))
+        if along_s == across_deg == 0.0:
+            return "ok the nudge is undone"
+        return f"ok nudged: {along_s:+.2f} s late, {across_deg:+.3f} deg right in all"
+
+    def _why_not_steered(self) -> str:
+        """Why no pass can be steered now; empty: one can."""
+        if self._control.is_resting or self._area.sky.plan is None or self._area.sky.prediction is None:
+            return "no pass is on"
+        return "" if self._area.state.is_armed(self._control) else "disarmed: `acu-daemon arm` first"
 
 
 def tell(*, line: str, who: str, answer: str) -> str:

@@ -31,6 +31,7 @@ class OperatorVerb:
     is_of_station: bool = False
 
 
+PASS = (VerbParameter("satellite", "name of its file"), VerbParameter("at", "a UTC at which it is up"))
 VERBS: Mapping[str, OperatorVerb] = {
     verb.name: verb
     for verb in (
@@ -40,6 +41,28 @@ VERBS: Mapping[str, OperatorVerb] = {
         OperatorVerb("clear", "clear the latch of an axis"),
         OperatorVerb("stow", "send the antenna to its stow position, and keep it there until `unstow`"),
         OperatorVerb("unstow", "end a stow, whoever's it is; the antenna leaves it when a pass is near"),
+        OperatorVerb("hold", "leave autotrack and follow the prediction, to the end of the pass or until `track`"),
+        OperatorVerb("track", "end a `hold`: autotrack is selected again on the path"),
+        OperatorVerb(
+            "nudge",
+            "move the path that the antenna is led along, to the end of the pass or the next fit; both 0 undo it",
+            (
+                VerbParameter("along_s", "late, or early where negative; left out: as it is", "s", -60.0, 60.0),
+                VerbParameter("across_deg", "right of the motion; left out: as it is", "deg", -5.0, 5.0),
+                VerbParameter("keep", "yes: the satellite's next passes begin with it, while these elements hold"),
+            ),
+        ),
+        OperatorVerb(
+            "skip", "give up a pass: that one, else that in progress, else the next", PASS, is_of_station=True
+        ),
+        OperatorVerb("unskip", "withdraw a word about a pass", PASS, is_of_station=True),
+        OperatorVerb(
+            "pause",
+            "begin no pass until then; the pause ends by itself",
+            (VerbParameter("until", "UTC, ISO 8601 with Z"),),
+            is_of_station=True,
+        ),
+        OperatorVerb("unpause", "end a pause now", is_of_station=True),
         OperatorVerb("reload", "read files and elements again, between passes", is_of_station=True),
     )
 }
@@ -49,6 +72,7 @@ VERBS: Mapping[str, OperatorVerb] = {
 class Said:
     """A line as it was understood.  figures, texts: what was given, by the names of the verb's parameters."""
 
+    line: str
     verb: OperatorVerb
     figures: Mapping[str, float] = field(default_factory=dict)
     texts: Mapping[str, str] = field(default_factory=dict)
@@ -72,7 +96,7 @@ def understood(line: str) -> Said:
             figures[key] = _figure(parameter, value)
         else:
             texts[key] = value
-    return Said(verb, figures, texts)
+    return Said(line, verb, figures, texts)
 
 
 def _figure(parameter: VerbParameter, value: str) -> float:

@@ -37,6 +37,7 @@ def status_rows(seen: Snapshot) -> list[tuple[str, str]]:
         ("antenna", _antenna(seen)),
         ("command", _command(seen)),
         ("path", _path(seen)),
+        ("nudge", words.nudge(seen)),
         ("signal", _signal(seen)),
         ("prediction", _prediction(seen)),
         ("buffer", _buffer(seen)),

@@ -65,6 +65,9 @@ class Snapshot:
     latch: str = ""  # what an axis did wrong; cleared by a person
     stow_by: str = ""  # whose the stow is that keeps the antenna: wind, operator, panel, schedule
     stow_alarm: str = ""  # that a stow is wanted, and why it is not carried out
+    is_held_by_person: bool = False  # autotrack is left for the prediction
+    nudge_along_s: float = 0.0  # what a person moves the path by: late, right positive
+    nudge_across_deg: float = 0.0
     encoder_problem: str = ""
     clock_alarm: str = ""
     line_alarm: str = ""

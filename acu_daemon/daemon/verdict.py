@@ -127,6 +127,9 @@ def _by_program(seen: Snapshot) -> Verdict:
     path = f"the path of the {seen.path}" if seen.path else "the path"
     if seen.is_on_path is not True:
         return Verdict("OFF PATH", Level.BAD, f"program track, and the antenna is half a beam or more off {path}")
+    if seen.is_held_by_person:
+        why = f"a person has the antenna led along {path}; `acu-daemon track` gives it back to autotrack"
+        return Verdict("HELD", Level.WATCH, why)
     if seen.signal_age_s is not None and not seen.signal_alarm:
         return _heard_beside(seen, path)
     return Verdict("PROGRAM TRACK", Level.GOOD, f"the antenna is led along {path}; no signal is waited for")

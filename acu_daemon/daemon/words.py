@@ -88,3 +88,12 @@ def buffer(seen: Snapshot) -> str:
     """How long the registers can be fed, and from what."""
     last = " (last pass)" if seen.model == Model.LAST_PASS else ""
     return f"buffer {seen.buffer_s:3.0f} s {seen.buffer_kind}{last}".rstrip()
+
+
+def nudge(seen: Snapshot) -> str:
+    """What a person moves the path by; empty: by nothing."""
+    along_s, across_deg = seen.nudge_along_s, seen.nudge_across_deg
+    if along_s == 0.0 and across_deg == 0.0:
+        return ""
+    along = f"{abs(along_s):.2f} s {'late' if along_s >= 0.0 else 'early'}"
+    return f"{along}, {across_deg:+.3f} deg across, by a person"

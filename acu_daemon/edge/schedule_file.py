@@ -1,16 +1,18 @@
 """schedule.sqlite3 in the antenna's state directory: passes, how they came out, and what people said of them.
 
 SQLite in WAL mode: the daemon writes while `acu-daemon schedule` reads or leaves a person's word, and a process that is
-killed loses nothing that was committed.  A file that cannot be written (a full disk) costs no pass: what could not be
+killed loses nothing that was committed.  Where the loop must not wait for the disk, what is written goes out through a
+queue, in order.  A file that cannot be written (a full disk) costs no pass: what could not be
 saved is saved with the next change.
 """
 
 import sqlite3
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import closing
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
+from acu_daemon.edge.writer import Job
 from acu_daemon.errors import UsageError
 from acu_daemon.schedule.book import Entry, PassState
 from acu_daemon.schedule.rules import PassRequest, Wish
@@ -39,18 +41,23 @@ class Words:
 
 
 class ScheduleFile:
-    """The file, opened.  Not for several threads at once.
+    """The file, opened: read by one thread, written by `put`, at once or in another one.
 
     Raises, when made: UsageError: it cannot be opened, is damaged, or is of a newer version.
     """
 
-    def __init__(self, directory: Path, *, is_read_only: bool = False) -> None:
+    def __init__(
+        self, directory: Path, *, is_read_only: bool = False, put: Callable[[Job], object] = lambda job: job()
+    ) -> None:
         self.path = directory / NAME
+        self._put = put
         self.problem = ""  # why the newest change is not saved
         self._owed: list[tuple[Entry, float]] = []
         mode = "ro" if is_read_only else "rwc"
         try:
-            self._db = sqlite3.connect(f"{self.path.resolve().as_uri()}?mode={mode}", uri=True, timeout=BUSY_S)
+            where = f"{self.path.resolve().as_uri()}?mode={mode}"
+            self._db = sqlite3.connect(where, uri=True, timeout=BUSY_S)
+            self._written = sqlite3.connect(where, uri=True, timeout=BUSY_S, check_same_thread=False)
             [version] = self._db.execute("pragma user_version").fetchone()
             if version > VERSION:
                 raise UsageError(
@@ -64,6 +71,7 @@ class ScheduleFile:
 
     def close(self) -> None:
         self._db.close()
+        self._put(self._written.close)
 
     def __enter__(self) -> "ScheduleFile":
         return self
@@ -86,9 +94,13 @@ class ScheduleFile:
 
     def save(self, entries: Iterable[Entry], now_tai_s: float) -> None:
         """Save entries, all or none.  Why they could not be stands in `problem`, and they are saved with the next."""
-        self._owed += [(one, now_tai_s) for one in entries]
+        new = [(one, now_tai_s) for one in entries]
+        self._put(lambda: self._save_owed(new))
+
+    def _save_owed(self, new: list[tuple[Entry, float]]) -> None:
+        self._owed += new
         try:
-            with self._db:
+            with self._written:
                 for entry, at_tai_s in self._owed:
                     self._save(entry, at_tai_s)
         except sqlite3.Error as error:
@@ -99,28 +111,32 @@ class ScheduleFile:
     def _save(self, entry: Entry, now_tai_s: float) -> None:
         values = {name: getattr(entry, name) for name in COLUMNS} | {"state": str(entry.state)}
         marks = ", ".join(f":{name}" for name in COLUMNS)
-        self._db.execute(f"insert or replace into passes ({', '.join(COLUMNS)}) values ({marks})", values)
-        last = self._db.execute(
+        self._written.execute(f"insert or replace into passes ({', '.join(COLUMNS)}) values ({marks})", values)
+        last = self._written.execute(
             "select state, reason from history where number = ? order by rowid desc limit 1", (entry.number,)
         ).fetchone()
         if last != (str(entry.state), entry.reason):
             row = (entry.number, now_tai_s, str(entry.state), entry.reason)
-            self._db.execute("insert into history values (?, ?, ?, ?)", row)
+            self._written.execute("insert into history values (?, ?, ?, ?)", row)
 
     def say(self, request: PassRequest, now_tai_s: float, by_whom: str) -> None:
-        """Leave a person's word.  UsageError: it cannot be saved."""
+        """Leave a person's word.  UsageError: it cannot be saved; where another thread writes, `problem` says so."""
         row = (request.satellite, request.at_tai_s, str(request.wish), now_tai_s, by_whom)
         self._said("insert into requests values (?, ?, ?, ?, ?)", row)
 
     def pause(self, until_tai_s: float, now_tai_s: float, by_whom: str) -> None:
-        """Pause the station until a time; NO_PAUSE ends a pause.  UsageError: it cannot be saved."""
+        """Pause the station until a time; NO_PAUSE ends a pause.  UsageError: as `say`."""
         self._said("insert into pauses values (?, ?, ?)", (until_tai_s, now_tai_s, by_whom))
 
     def _said(self, statement: str, row: tuple[object, ...]) -> None:
+        self._put(lambda: self._write_word(statement, row))
+
+    def _write_word(self, statement: str, row: tuple[object, ...]) -> None:
         try:
-            with self._db:
-                self._db.execute(statement, row)
+            with self._written:
+                self._written.execute(statement, row)
         except sqlite3.Error as error:
+            self.problem = f"{self.path}: {error}; a word was not taken"
             raise UsageError(f"{self.path}: {error}; nothing was changed") from None
 
     def words(self) -> Words:
@@ -138,7 +154,7 @@ class ScheduleFile:
 
     def prune(self, before_tai_s: float) -> int:
         """Delete what set before a time; returns how many passes."""
-        with self._db, closing(self._db.cursor()) as cursor:
+        with self._written, closing(self._written.cursor()) as cursor:
             cursor.execute(
                 "delete from history where number in (select number from passes where set_tai_s < ?)", (before_tai_s,)
             )

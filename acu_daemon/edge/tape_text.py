@@ -13,7 +13,7 @@ import numpy as np
 
 from acu_daemon.assist.session.refit import GateVerdict, RefitReply
 from acu_daemon.control.receiver_signal import SignalSample
-from acu_daemon.control.tick_input import Asking, Request, StowBy, StowWish
+from acu_daemon.control.tick_input import Asking, HoldWish, NudgeWish, Request, StowBy, StowWish
 from acu_daemon.edge.tape import Record
 from acu_daemon.errors import AcuDaemonError
 from acu_daemon.model import AngleBias, Correction, FitResult, Model
@@ -150,11 +150,28 @@ class TapeReader:
 
 
 def _asking_json(asking: Asking) -> Any:
-    return [asking.by, asking.is_wanted] if isinstance(asking, StowWish) else str(asking)
+    match asking:
+        case StowWish(by, is_wanted):
+            return [by, is_wanted]
+        case HoldWish(is_wanted):
+            return {"hold": is_wanted}
+        case NudgeWish(along_s, across_deg):
+            return {"nudge": [along_s, across_deg]}
+        case _:
+            return str(asking)
 
 
 def _asking_of(read: Any) -> Asking:
-    return Request(read) if isinstance(read, str) else StowWish(StowBy(read[0]), is_wanted=read[1])
+    match read:
+        case str():
+            return Request(read)
+        case {"hold": is_wanted}:
+            return HoldWish(is_wanted)
+        case {"nudge": [along_s, across_deg]}:
+            return NudgeWish(along_s, across_deg)
+        case [by, is_wanted]:
+            return StowWish(StowBy(by), is_wanted)
+    raise ValueError(f"{read!r} is nothing that is asked for")
 
 
 def _bytes(text: str) -> bytes:

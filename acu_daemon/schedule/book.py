@@ -162,3 +162,11 @@ def _gone(old: Entry, now_tai_s: float, until_tai_s: float) -> Entry:
 
 def _words(entry: Entry) -> str:
     return f"{entry.state} ({entry.reason})" if entry.reason else str(entry.state)
+
+
+def paused(entry: Entry, until_tai_s: float) -> Entry:
+    """An entry as a pause leaves it."""
+    if entry.state is not PassState.PLANNED or entry.start_tai_s is None or entry.start_tai_s >= until_tai_s:
+        return entry
+    reason = f"paused by a person until {utc_text(until_tai_s, 0)}"
+    return replace(entry, state=PassState.CANCELLED, reason=reason)

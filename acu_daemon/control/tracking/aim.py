@@ -7,8 +7,8 @@ from acu_daemon.acu.commands import AcuMode
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick_input import Sky
+from acu_daemon.control.tracking.by_hand import steered_point
 from acu_daemon.control.tracking.causes import path_point
-from acu_daemon.control.tracking.path_offset import learned_point
 from acu_daemon.control.tracking.scan import pointing
 from acu_daemon.control.tracking.state_table import ACTIVE, AUTOTRACKING, HOLDING, TrackState
 from acu_daemon.model import Pointing
@@ -49,7 +49,7 @@ def _point(
         return None  # a mode that follows the registers must find them where the antenna is, not where it shall go
     if state.tracking.track is TrackState.SEARCH and sky.prediction is not None:
         return pointing(state.search.scan, sky.prediction, aim_tai_s, config) or path_point(sky, aim_tai_s)
-    return learned_point(state, sky, aim_tai_s, follow=is_followed) or path_point(sky, aim_tai_s, follow=is_followed)
+    return steered_point(state, sky, aim_tai_s, follow=is_followed)
 
 
 def _is_denied(state: ControlState, config: ControlConfig) -> bool:

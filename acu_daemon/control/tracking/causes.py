@@ -48,6 +48,7 @@ def find_causes(state: ControlState, given: TickInput, config: ControlConfig) ->
         causes |= _of_plan(state, status, given, config)
         causes |= _of_time(state, status, given, config)
         causes |= _of_zenith(state, given, config)
+        causes |= _of_hand(state, given.sky, config)
         causes |= _of_false_lock(state, status, given, config)
         causes = _of_zones(causes, state, given, config)
     return causes
@@ -71,6 +72,15 @@ def _of_false_lock(state: ControlState, status: AcuStatus, given: TickInput, con
         if is_on or given.now_tai_s - state.tracking.entered_tai_s > LEAVING_S:
             causes.add(Cause.BACK_ON_PATH)
     return causes
+
+
+def _of_hand(state: ControlState, sky: Sky, config: ControlConfig) -> set[Cause]:
+    """Whether a person wants the prediction followed; without a signal it is followed as ever."""
+    if not config.has_signal:
+        return set()
+    if state.by_hand.is_held:
+        return {Cause.HELD}
+    return {Cause.RELEASED_FITTED if sky.is_fitted else Cause.RELEASED}
 
 
 def _of_zenith(state: ControlState, given: TickInput, config: ControlConfig) -> set[Cause]:
@@ -189,7 +199,7 @@ def _of_place(
     is_there = status.mode is AcuMode.REMOTE and is_on_turn and distance_deg < ON_POINT_BEAMS * config.beamwidth_deg
     is_heard = is_in_pass and not is_on_turn and status.is_acquired and status.mode in (AcuMode.REMOTE, AcuMode.STANDBY)
     causes: set[Cause] = set()
-    if not config.has_signal:
+    if not config.has_signal or state.by_hand.is_held:
         is_on_path = is_on_turn and distance_deg <= config.beamwidth_deg / 2 + config.acu.dead_band_deg
         return {Cause.ON_PROGRAM} if is_on_path and status.mode is AcuMode.REMOTE else set()
     if is_there or (is_heard and distance_deg < HEARD_BEAMS * config.beamwidth_deg):

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick_input import Sky
+from acu_daemon.control.tracking.by_hand import nudge_in_force, steered_point
 from acu_daemon.control.tracking.causes import path_point
-from acu_daemon.control.tracking.path_offset import learned_point
+from acu_daemon.control.tracking.path_offset import learned_offset
 from acu_daemon.control.tracking.state_table import ACTIVE, TrackState
 from acu_daemon.model import Model, sky_angle_deg
 
@@ -33,13 +34,12 @@ def off_path(state: ControlState, sky: Sky) -> OffPath | None:
     if reading is None or state.tracking.track not in ACTIVE:
         return None
     made_from = MADE_FROM[sky.prediction.model] if sky.prediction is not None else MADE_FROM[Model.ELEMENTS]
-    point = None
-    if state.tracking.track is not TrackState.PREPOSITION:
-        point = learned_point(state, sky, reading.tai_s, follow=False)
-    if point is not None:
-        made_from += ", moved to the signal"
-    else:
+    if state.tracking.track is TrackState.PREPOSITION:
         point = path_point(sky, reading.tai_s, follow=False)
+    else:
+        point = steered_point(state, sky, reading.tai_s, follow=False)
+        made_from += ", moved to the signal" if learned_offset(state, sky) is not None else ""
+        made_from += ", nudged" if nudge_in_force(state) is not None else ""
     if point is None:
         return None
     return OffPath(sky_angle_deg(reading.az_deg, reading.el_deg, point.az_deg, point.el_deg), made_from)

@@ -14,9 +14,9 @@ from acu_daemon.control.tick_input import Sky, TickInput
 from acu_daemon.control.tracking.causes import is_acquired
 from acu_daemon.control.tracking.search import forget_search
 from acu_daemon.control.tracking.state_table import AUTOTRACKING, TrackState
-from acu_daemon.control.tracking.track_frame import beside, extents, is_within, offset_of
+from acu_daemon.control.tracking.track_frame import extents, is_within, offset_of
 from acu_daemon.control.with_parts import with_parts
-from acu_daemon.model import Pointing, Reading
+from acu_daemon.model import Reading
 
 GAIN = 0.6  # of the newest reading in the smoothed offset: autotrack pulls in quickly
 
@@ -96,11 +96,11 @@ def _learn_offset(signal: Signal, reading: Reading, sky: Sky, config: ControlCon
     return replace(signal, offset=PathOffset(*new, prediction.model), is_offset_refused=False)
 
 
-def learned_point(state: ControlState, sky: Sky, tai_s: float, *, follow: bool) -> Pointing | None:
-    """The path as autotrack showed it before the first fit; None: as it is predicted."""
+def learned_offset(state: ControlState, sky: Sky) -> tuple[float, float] | None:
+    """By how many seconds late and degrees right autotrack showed the path before the first fit; None: as predicted."""
     offset, prediction = state.signal.offset, sky.prediction
     if offset is None or prediction is None or offset.model is not prediction.model:
         return None
     if state.tracking.track not in OFFSET_STATES:
         return None
-    return beside(prediction, tai_s, (offset.along_s, offset.across_deg), follow=follow)
+    return offset.along_s, offset.across_deg

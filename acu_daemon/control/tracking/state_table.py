@@ -63,6 +63,9 @@ class Cause(StrEnum):
     ACQUIRE_OVER = "no signal within acquire_s"
     HOLD_OVER = "no signal within hold_s"
     LOCK_FALSE = "autotrack holds something else than the satellite: it is left for the prediction"
+    HELD = "a person has the prediction followed"
+    RELEASED = "a person gives it back to autotrack"
+    RELEASED_FITTED = "a person gives it back to autotrack, and a fit of this pass exists"
     BACK_ON_PATH = "the antenna is back on the path"
     ZENITH_NEAR = "the azimuth drive cannot follow over the zenith: the antenna is led past it"
     ZENITH_PAST = "the antenna is past the zenith"
@@ -110,6 +113,9 @@ TABLE: tuple[Row, ...] = (
     Row(ACTIVE, Cause.HANDS_OFF, S.IDLE),
     Row(TRACKING, Cause.KEEP_OUT, S.AVOID, "4 s before the keep-out"),
     Row(frozenset({S.AVOID}), Cause.KEEP_OUT_PAST, S.IDLE),
+    Row(TRACKING - {S.PROGRAM, S.ZENITH}, Cause.HELD, S.PROGRAM),
+    Row(frozenset({S.PROGRAM}), Cause.RELEASED_FITTED, S.HOLD_FITTED),
+    Row(frozenset({S.PROGRAM}), Cause.RELEASED, S.HOLD_TLE),
     Row(frozenset({S.IDLE, S.PREPOSITION}), Cause.ACQUIRED_FITTED, S.AUTOTRACK_FITTED),
     Row(frozenset({S.IDLE, S.PREPOSITION}), Cause.ACQUIRED, S.AUTOTRACK_TLE),
     Row(frozenset({S.IDLE}), Cause.STILL_FITTED, S.HOLD_FITTED),

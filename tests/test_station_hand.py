@@ -1,0 +1,68 @@
+"""What a person says to the running station of passes: skip, pause, and a nudge that is kept."""
+
+from pathlib import Path
+
+from test_station import START, night
+from test_station_stow import RISE, modes, says
+
+from acu_daemon.acu.commands import AcuMode
+from acu_daemon.cli.pass_course import KeptNudge
+from acu_daemon.cli.virtual_station import StationAccess
+from acu_daemon.orbit.timescales import utc_text
+from acu_daemon.schedule.book import PassState
+
+ENDS_S = 4.8  # minutes from START
+
+
+def test_a_pass_that_is_skipped_is_given_up_with_a_stop_and_cancelled(tmp_path: Path) -> None:
+    answers: list[str] = []
+    found = night(tmp_path, minutes=ENDS_S, script=[(RISE + 15.0, says("skip", answers))])
+    assert answers[0].startswith("ok given up: scd of ")
+    assert (found.of("scd").state, found.of("scd").reason) == (PassState.CANCELLED, "skipped by a person")
+    assert modes(found, RISE + 17.0, RISE + 80.0) == {AcuMode.STANDBY}
+
+
+def test_the_next_pass_is_skipped_or_not_by_a_word_and_another_gets_its_time(tmp_path: Path) -> None:
+    answers: list[str] = []
+    at = utc_text(RISE + 30.0)
+    script = [
+        (START + 1.0, says("skip", answers)),
+        (START + 3.0, says(f"unskip satellite=scd at={at}", answers)),
+        (START + 5.0, says(f"skip satellite=scd at={at}", answers)),
+        (START + 7.0, says("skip satellite=none at=2026-01-01T00:00:00Z", answers)),
+    ]
+    found = night(tmp_path, minutes=0.3, script=script)
+    assert [one.split(" ")[0] for one in answers] == ["ok", "ok", "ok", "error"]
+    assert (found.of("scd").state, found.of("scd").reason) == (PassState.REFUSED, "excluded by a person")
+    assert found.of("behind").state is PassState.PLANNED
+
+
+def test_a_pause_begins_no_pass_and_what_it_costs_is_cancelled_by_name(tmp_path: Path) -> None:
+    answers: list[str] = []
+    until = utc_text(START + 1000.0, 0)
+    script = [(START + 1.0, says(f"pause until={until}", answers)), (START + 2.0, says("pause until=soon", answers))]
+    found = night(tmp_path, minutes=ENDS_S, script=script)
+    assert [one.split(":")[0] for one in answers] == [f"ok no pass is begun until {until[:13]}", "error until 'soon'"]
+    assert (found.of("scd").state, found.of("scd").reason) == (PassState.CANCELLED, f"paused by a person until {until}")
+    assert modes(found, START, RISE + 80.0) == {AcuMode.STANDBY}
+
+
+def test_a_nudge_that_is_kept_is_of_the_satellite_while_its_elements_hold(tmp_path: Path) -> None:
+    answers: list[str] = []
+    kept: list[KeptNudge | None] = []
+
+    def look(access: StationAccess) -> None:
+        elements = "Brouwer means of 1989"
+        course = access.runs.day.course
+        [nudge] = course._nudges.values()
+        kept.extend((nudge, course.nudge_for("scd", nudge.elements), course.nudge_for("scd", elements)))
+
+    script = [
+        (RISE - 10.0, says("nudge along_s=0.5 keep=yes", answers)),
+        (RISE - 8.0, says("skip", answers)),
+        (RISE - 5.0, look),
+    ]
+    night(tmp_path, minutes=3.4, script=script)
+    assert answers[0] == "ok nudged: +0.50 s late, +0.000 deg right in all"
+    assert kept[0] is not None
+    assert (kept[0].along_s, kept[1], kept[2]) == (0.5, kept[0], None)
