@@ -32,6 +32,7 @@ from acu_daemon.cli.options import (
     nearest_to_pass,
     whose_recording,
 )
+from acu_daemon.cli.outlets_beside import Outlets
 from acu_daemon.cli.page import PageFrame, RunningPage, WatchedRuns, Web, chosen_page
 from acu_daemon.cli.pass_tape import begin_tape
 from acu_daemon.cli.rehearsal import clock_text, meet_in_rehearsal, met_by_chance
@@ -257,12 +258,16 @@ async def _run(
     snapshots = SnapshotFile(frame.directory, frame.files, snapshot_ticks)
     elements = ElementsWatch(frame.config, frame.name, first.target, clock, frame.folders)
     section = first.target.station.elements
-    fetching = ElementsFetching(frame.config, section, clock, is_rehearsal=clock.is_rehearsal)
+    outlets = Outlets(first.target.station, frame.directory, clock, page_frame.lease)
+    fetching = ElementsFetching(
+        frame.config, section, clock, is_rehearsal=clock.is_rehearsal, on_asked=outlets.asked_for_elements
+    )
 
     def show(seen: Snapshot) -> None:
         health.see(seen)
         snapshots.write(seen)
         page.see(seen)
+        outlets.see(seen)
         if live is not None:
             live.show(seen)
 
@@ -305,19 +310,21 @@ async def _run(
             elements_problem=lambda: fetching.problem,
             why_anew=why_anew,
             note=no_note if tape is None else tape.note,
+            tally=outlets.tally,
         )
 
     runs = Runs(begin)
-    page = RunningPage(page_frame, WatchedRuns(lambda: runs.service, runs.answer), clock)
+    page = RunningPage(page_frame, WatchedRuns(lambda: runs.service, outlets.counted(runs.answer)), clock)
     loop = asyncio.get_running_loop()
     loop.set_exception_handler(tell_loop_problem)
     ignored = take_signals(loop, runs.stop, tell_signal)
     if ignored:
         reason = "whoever started this daemon ignores them, as nohup does"
         structlog.get_logger("run").info("signals.ignored", signals=ignored, reason=reason)
-    control = ControlSocket(frame.directory, runs.answer)
+    control = ControlSocket(frame.directory, outlets.counted(runs.answer))
     await control.open()
     await page.open()
+    await outlets.open()
     await weather.open()
     gc.freeze()  # a full collection over the start-up heap would stall a tick by tens of milliseconds
     sync = asyncio.create_task(clock.watch_synchronisation())
@@ -331,6 +338,7 @@ async def _run(
             tape.close()
         await control.close()
         await page.close()
+        await outlets.close()
         weather.close()
         notifier.close()
         if live is not None:

@@ -150,6 +150,7 @@ def make_job(
         signal_udp=station.receiver.signal_udp,
         is_rehearsal=is_rehearsal,
         end_tai_s=end_tai_s,
+        elements_epoch_tai_s=target.elements.epoch_tai_s,
         satellite=target.satellite.satellite.name,
         station=station.station.name,
         elements=f"{target.elements.propagator.kind} of {utc_text(target.elements.epoch_tai_s, 0)}",

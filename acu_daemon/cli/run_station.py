@@ -30,8 +30,9 @@ async def run_station(setup: StationSetup, clock: SystemClock, first: Target, li
     take_signals(loop, runs.stop, tell_signal)
     if not _has_terminal():
         loop.add_signal_handler(signal.SIGHUP, runs.day.ask_reload)
-    control = ControlSocket(setup.directory, runs.answer)
+    control = ControlSocket(setup.directory, runs.outlets.counted(runs.answer))
     await control.open()
+    await runs.outlets.open()
     await runs.page.open()
     await runs.day.wind.open()
     sync = asyncio.create_task(clock.watch_synchronisation())
@@ -45,6 +46,7 @@ async def run_station(setup: StationSetup, clock: SystemClock, first: Target, li
         sync.cancel()
         await control.close()
         await runs.page.close()
+        await runs.outlets.close()
         await runs.close()
         if live is not None:
             live.clear()

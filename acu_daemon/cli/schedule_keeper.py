@@ -2,7 +2,7 @@
 
 import asyncio
 import math
-from collections.abc import Iterable
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,11 @@ from acu_daemon.cli.schedule_plan import StationPlan, station_plan
 from acu_daemon.cli.station_wind import Beside
 from acu_daemon.config.load import load_station
 from acu_daemon.config.station_tables import StationFile
+from acu_daemon.daemon.tally import Tally
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.schedule_file import ScheduleFile, Words
 from acu_daemon.errors import AcuDaemonError
-from acu_daemon.schedule.book import UNDER_WAY, Entry, PassState, merged, paused
+from acu_daemon.schedule.book import OVER, UNDER_WAY, Entry, PassState, merged, paused
 from acu_daemon.schedule.decisions import RESUMED
 from acu_daemon.schedule.exact_plan import Slot
 from acu_daemon.schedule.rules import PassRequest, Wish
@@ -30,8 +31,11 @@ WORD = "a person's word"
 class ScheduleKeeper:
     """Owned by the loop; planning goes on beside it.  anew_reason: why it is to plan at once, empty: it need not."""
 
-    def __init__(self, config: Path, clock: Clock, file: ScheduleFile, station: StationFile, beside: Beside) -> None:
+    def __init__(
+        self, config: Path, clock: Clock, file: ScheduleFile, station: StationFile, beside: Beside, tally: Tally
+    ) -> None:
         self.station = station
+        self._tally = tally
         self.anew_reason = "the start"
         self.words = Words()
         self._config, self._clock, self._file, self._beside = config, clock, file, beside
@@ -160,7 +164,10 @@ class ScheduleKeeper:
         self._save([changed])
         return changed
 
-    def _save(self, entries: Iterable[Entry]) -> None:
+    def _save(self, entries: Collection[Entry]) -> None:
+        for one in entries:
+            if one.state in OVER:
+                self._tally.count("passes", str(one.state))
         before = self._file.problem
         self._file.save(entries, self._clock.tai_s())
         if self._file.problem and self._file.problem != before:

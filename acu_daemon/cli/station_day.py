@@ -8,6 +8,7 @@
 
 import asyncio
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ from acu_daemon.cli.station_wind import Beside, StationWind
 from acu_daemon.config.station_tables import StationFile
 from acu_daemon.control.tick_input import StowBy, StowWish
 from acu_daemon.daemon.snapshot import Snapshot
+from acu_daemon.daemon.tally import Tally
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.elements_fetching import ElementsFetching
 from acu_daemon.edge.hooks import Hook, Hooks
@@ -51,21 +53,24 @@ class StationDay:
         beside: Beside = asyncio.to_thread,
         check: Check | None = None,
         is_rehearsal: bool = False,
+        tally: Tally | None = None,
+        on_asked: Callable[[str, str], None] = lambda _source, _problem: None,
     ) -> None:
         """beside: does what takes long, beside the loop.  check: what of a pass is a no-go; None: files and ACU."""
         self._is_rehearsal = is_rehearsal
         self.config, self._clock, self._directory = config, clock, file.path.parent
+        self._tally = Tally() if tally is None else tally
         self._files = ConfigurationWatch(config)
         self._good: dict[str, Target] = {}  # satellites as they could be used last
         self._log: Any = structlog.get_logger("station")
         self.hooks = Hooks(station.hooks.commands, station.hooks.time_limit_s)
-        self.keeper = ScheduleKeeper(config, clock, file, station, beside)
+        self.keeper = ScheduleKeeper(config, clock, file, station, beside, self._tally)
         self.course = PassCourse(self.keeper, self.hooks, self.about)
         self.checks = PassChecks(check or self._no_gos, beside, self._tell_no_go)
         self._next_rise = NextRise(config, self._directory, beside)
         self.wind = StationWind(station.wind, config, beside)
         self.stow_by = StowBy.NOBODY
-        self.fetching = ElementsFetching(config, station.elements, clock, is_rehearsal=is_rehearsal)
+        self.fetching = ElementsFetching(config, station.elements, clock, is_rehearsal=is_rehearsal, on_asked=on_asked)
 
     @property
     def station(self) -> StationFile:
@@ -123,11 +128,9 @@ class StationDay:
         return max(lead_s, self.station.schedule.pre_s) + SPARE_S + self.station.hooks.before_move_s
 
     def _no_gos(self, satellite: str, now_tai_s: float) -> list[str]:
-        return [
-            f"{one.what}: {one.detail}"
-            for one in findings(self.config, satellite, now_tai_s, self._directory)
-            if one.verdict == NO_GO
-        ]
+        found = list(findings(self.config, satellite, now_tai_s, self._directory))
+        self._tally.checks = {one.what: one.verdict != NO_GO for one in found}
+        return [f"{one.what}: {one.detail}" for one in found if one.verdict == NO_GO]
 
     def _tell_no_go(self, entry: Entry, reason: str) -> None:
         self.hooks.call(Hook.ON_NO_GO, self.about(entry) | {"reason": reason})

@@ -11,6 +11,7 @@ import structlog
 
 from acu_daemon.cli.kept import Kept, open_kept
 from acu_daemon.cli.options import Target
+from acu_daemon.cli.outlets_beside import Outlets
 from acu_daemon.cli.page import RunningPage, WatchedRuns, passes_shown
 from acu_daemon.cli.pass_tape import begin_tape
 from acu_daemon.cli.run_setup import make_job
@@ -45,6 +46,8 @@ class StationRuns:
 
     def __init__(self, setup: StationSetup, first: Target, live: LiveLine | None) -> None:
         self._setup, self._first, self._live = setup, first, live
+        lease = None if setup.page is None else setup.page.lease
+        self.outlets = Outlets(first.station, setup.directory, setup.clock, lease, lambda: self.day.wind.seen)
         self.day = StationDay(
             setup.config,
             setup.clock,
@@ -53,8 +56,10 @@ class StationRuns:
             beside=setup.beside,
             check=setup.check,
             is_rehearsal=setup.clock.is_rehearsal,
+            tally=self.outlets.tally,
+            on_asked=self.outlets.asked_for_elements,
         )
-        watched = WatchedRuns(lambda: self._service, self.answer, self._passes)
+        watched = WatchedRuns(lambda: self._service, self.outlets.counted(self.answer), self._passes)
         self.page = RunningPage(setup.page, watched, setup.clock)
         self._notifier = Notifier()
         self._health = Health(self._notifier)
@@ -243,6 +248,7 @@ class StationRuns:
             elements_problem=lambda: self.day.fetching.problem,
             why_anew=why_anew,
             note=self._tape.note if is_pass and self._tape is not None else no_note,
+            tally=self.outlets.tally,
         )
         self._service, self._is_resting = service, job.control.is_resting
         if self._first_ask is not None:
@@ -271,6 +277,7 @@ class StationRuns:
         self._health.see(seen)
         self._snapshots.write(seen)
         self.page.see(seen)
+        self.outlets.see(seen)
         self.day.see(seen)
         self._obey_wind(seen)
         if self._live is not None:

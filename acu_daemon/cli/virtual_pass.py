@@ -20,6 +20,7 @@ from acu_daemon.cli.simulated import station_air
 from acu_daemon.cli.tape_head import head_of
 from acu_daemon.daemon.service import Outcome, Service, SignalSource
 from acu_daemon.daemon.snapshot import Snapshot
+from acu_daemon.daemon.tally import Tally
 from acu_daemon.drivers.sa3842.codec import CommandDecoder, address_byte
 from acu_daemon.drivers.sa3842.messages import Command
 from acu_daemon.edge.clock import LoopClock
@@ -110,6 +111,7 @@ def fly(
     make_runner: Callable[[RefitSetup], FitRunner] = InlineFitRunner,
     signal: SignalSource | None = None,
     tape: Path | None = None,
+    tally: Tally | None = None,
 ) -> Flight:
     """Run the daemon on a pass in virtual time.
 
@@ -162,6 +164,7 @@ def fly(
             on_estimate=flight.estimates.append,
             on_reading=flight.readings.append,
             signal=signal,
+            tally=tally,
         )
         loop = asyncio.get_running_loop()
         for tai_s, action in script:

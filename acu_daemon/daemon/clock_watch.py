@@ -24,6 +24,7 @@ class ClockWatch:
         self._log: Any = structlog.get_logger("clock")
         self.alarm = ""
         self.difference_s = 0.0
+        self.sky_rate_deg_s = 0.0  # how fast the satellite moves
 
     @property
     def step_s(self) -> float:
@@ -33,7 +34,8 @@ class ClockWatch:
     def look(self, prediction: Prediction | None) -> None:
         """Follow the system clock for one second; prediction: how fast the satellite moves now."""
         self.difference_s = self._clock.follow()
-        kind, self.alarm = self._judge(_sky_rate_deg_s(prediction, self._clock.tai_s()))
+        self.sky_rate_deg_s = _sky_rate_deg_s(prediction, self._clock.tai_s())
+        kind, self.alarm = self._judge(self.sky_rate_deg_s)
         if kind == self._kind:
             return
         if kind:

@@ -7,6 +7,7 @@ from typing import Any
 import structlog
 
 from acu_daemon.acu.commands import (
+    READS,
     Command,
     FreeTurnChoice,
     PointAndPoll,
@@ -36,6 +37,7 @@ from acu_daemon.daemon.motion import Motion
 from acu_daemon.daemon.port import AcuPort, Answer
 from acu_daemon.daemon.stop_times import StopTimes
 from acu_daemon.daemon.stopping import DEADLINE_S, stop_antenna
+from acu_daemon.daemon.tally import Tally
 from acu_daemon.daemon.tick_lateness import Lateness
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.tape import Note, no_note
@@ -66,6 +68,7 @@ class Foreground:
         on_reading: Callable[[Reading], None] | None = None,
         signal: Callable[[float], SignalSample | None] | None = None,
         note: Note = no_note,
+        tally: Tally | None = None,
     ) -> None:
         """signal: what a receiver beside the ACU has said since it was asked last, by TAI; None: there is none."""
         self._area = area
@@ -77,6 +80,7 @@ class Foreground:
         self._after_tick = after_tick
         self._on_reading = on_reading
         self._signal = signal
+        self._tally = Tally() if tally is None else tally
         self._doubt_again_s = -math.inf
         self._requests: tuple[Asking, ...] = ()
         self._connect_count = 0
@@ -108,6 +112,7 @@ class Foreground:
                 await self._clock.sleep_until(due_tai_s)
             late_s = self._clock.tai_s() - due_tai_s
             self.lateness.add(late_s)
+            self._tally.lateness.add(late_s)
             self.tick_count += 1
             await self._tick()
             await self._hurry(due_tai_s)
@@ -185,6 +190,8 @@ class Foreground:
         signal = None if self._signal is None else self._signal(now_tai_s)
         orders = self._decider.decide(now_tai_s, silence_s, requests, signal, must_poll=must_poll, has_room=has_room)
         self._report(orders.events)
+        for event in orders.events:
+            self._tally.told(event, now_tai_s)
         if not port.is_up:
             return
         is_answered = await (self._question() if must_poll else self._do(orders.first, "1"))
@@ -215,16 +222,26 @@ class Foreground:
         if order:
             self._note(("D", order))
         answer = await self._port.exchange(command)
+        self._count(command, answer)
         if isinstance(command, Stop):
             self.stop_times = self.stop_times.after(answer.started_tai_s, answer.first_byte_tai_s, answer.reply)
         if isinstance(command, PointAndPoll | Poll) and answer.reply is not None and not self._port.no_contact:
             self._status_s = self._clock.monotonic_s()
         if isinstance(command, PointAndPoll) and isinstance(answer.reply, AcuStatus):
             self.write_count += 1
+            self._tally.wrote(answer.started_tai_s)
         self._hear(command, answer)
         if isinstance(answer.reply, Refused) and not self._port.no_contact:
             await self._poll_after_nak(command, answer.reply.why)
         return answer.reply is not None
+
+    def _count(self, command: Command, answer: Answer) -> None:
+        took_s = self._clock.tai_s() - answer.started_tai_s
+        self._tally.exchanged(None if answer.reply is None else took_s)
+        if not isinstance(command, READS):
+            self._tally.count("commands")
+            if isinstance(answer.reply, Refused):
+                self._tally.count("refused", "acu")
 
     async def _question(self) -> bool:
         """After a failed exchange: poll, or ask what stands in for it, whose answer nobody waits for."""
@@ -255,6 +272,7 @@ class Foreground:
         if heard.reading is None:
             return
         self.motion.add(heard.reading)
+        self._tally.count("readings")
         if self._on_reading is not None and answer.is_sure:
             self._on_reading(heard.reading)
 

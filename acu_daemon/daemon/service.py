@@ -29,6 +29,7 @@ from acu_daemon.daemon.operator_requests import Hands
 from acu_daemon.daemon.port import AcuPort
 from acu_daemon.daemon.snapshot import Snapshot, Subject
 from acu_daemon.daemon.taking import take_snapshot
+from acu_daemon.daemon.tally import RunFigures, Tally
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.fit import FitRunner
 from acu_daemon.edge.link import Link
@@ -72,6 +73,7 @@ class PassJob:
     satellite: str = ""  # names for people
     station: str = ""
     elements: str = ""  # kind and epoch, for people
+    elements_epoch_tai_s: float | None = None
     next_passes: tuple[str, ...] = ()  # after this one, for people
     move: PassPlan | None = None  # only go there, before a pass or after it
     is_anew: bool = False  # not the first run of this daemon: the ACU was there
@@ -124,6 +126,7 @@ class Service:
         why_anew: Callable[[bool, float], str] | None = None,
         signal: SignalSource | None = None,
         note: Note = no_note,
+        tally: Tally | None = None,
     ) -> None:
         """on_end: called when the run is over, before the safe stop, which may take stopping.DEADLINE_S.
 
@@ -131,6 +134,7 @@ class Service:
         whether the antenna waits, and by how many seconds the system clock has stepped.
 
         signal: what tells of the signal beside the ACU, in the place of a reader of job.signal_udp.
+        tally: what counts through all runs of the process.
         """
         self._job = job
         self._clock = clock
@@ -146,6 +150,8 @@ class Service:
         self._signal: SignalSource | None = signal
         if signal is None and job.signal_udp is not None:
             self._signal = SignalReader(job.signal_udp, has_own_time=not job.is_rehearsal)
+        self._tally = Tally() if tally is None else tally
+        self._permit_refused_before = self._tally.counts["refused", "permit"]
         self.anew_reason = ""  # why the run has ended: another is to follow at once
         self._is_over = asyncio.Event()
         self._stop_reason = ""
@@ -175,6 +181,7 @@ class Service:
             on_reading=on_reading,
             signal=None if self._signal is None else self._signal.now,
             note=note,
+            tally=self._tally,
         )
         self.drawing = DrawingBoard(self._area, job.control, job.refit, job.coming, clock)
         self._hands = Hands(self._area, job.control, self._foreground.ask, self.snapshot, clock.tai_s)
@@ -189,6 +196,7 @@ class Service:
         Raises: NoAcuError: no good poll at the start.  UsageError: a rehearsal on a real ACU.
         """
         reason, is_stopped = "error", False
+        self._tally.begin_run()
         if self._signal is not None:
             await self._signal.open()
         try:
@@ -339,7 +347,9 @@ class Service:
         if self._on_state is not None:
             self._on_state(self._area.state)
         if self._on_snapshot is not None and self._foreground.tick_count % self._snapshot_ticks == 0:
-            self._on_snapshot(self.snapshot())
+            seen = self.snapshot()
+            self._tally.see(seen, self._figures())
+            self._on_snapshot(seen)
 
     def snapshot(self) -> Snapshot:
         """Everything people look at, now."""
@@ -365,6 +375,30 @@ class Service:
     def lateness_ms(self, most: int) -> Array:
         """How late the newest ticks came, at most so many, milliseconds."""
         return self._foreground.lateness.newest_ms(most)
+
+    def _figures(self) -> RunFigures:
+        """What other programs are told beside the snapshot."""
+        job, port, area, watch = self._job, self._port, self._area, self._foreground.clock_watch
+        permit_count = self._tally.counts["refused", "permit"] - self._permit_refused_before
+        return RunFigures(
+            connect_count=port.connect_count,
+            fit_count=area.refit_count,
+            fit_failed_count=area.refit_failed_count,
+            permit_refusal_count=permit_count,
+            link_errors={
+                "no_reply": port.failed_exchange_count,
+                "garbled": port.garbled_count,
+                "discarded": port.discarded_count,
+                "late": port.late_count,
+                "doubted": area.state.plausibility.doubted_count,
+            },
+            elements_epoch_tai_s=job.elements_epoch_tai_s,
+            next_rise_tai_s=job.coming.rise_tai_s if job.coming is not None else None,
+            beamwidth_deg=job.control.beamwidth_deg,
+            clock_error_s=watch.difference_s,
+            sky_rate_deg_s=watch.sky_rate_deg_s,
+            is_clock_synchronised=self._clock.is_synchronised,
+        )
 
     def answer(self, line: str, who: str = "") -> str:
         """Answer a person's line (daemon.operator_verbs).  who: says it, and from where."""

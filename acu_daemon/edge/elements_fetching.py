@@ -3,8 +3,10 @@
 import asyncio
 import contextlib
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import structlog
 
@@ -13,7 +15,7 @@ from acu_daemon.edge.child_process import start_python
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.clock_sense import before_release
 from acu_daemon.edge.elements_status import fetch_problems
-from acu_daemon.edge.fetch_policy import FIRST_PAUSE_S, HOUR_S, LONGEST_PAUSE_S, is_due
+from acu_daemon.edge.fetch_policy import FIRST_PAUSE_S, HOUR_S, LONGEST_PAUSE_S, FetchState, is_due
 from acu_daemon.edge.fetch_state_file import read_fetch_state
 
 LOOK_S = 60.0
@@ -27,8 +29,21 @@ class ElementsFetching:
     problem: what is wrong with the sources, for `status`; "": nothing.
     """
 
-    def __init__(self, config: Path, section: ElementsSourcesSection, clock: Clock, *, is_rehearsal: bool) -> None:
-        """is_rehearsal: at another time than now nothing is fetched."""
+    def __init__(
+        self,
+        config: Path,
+        section: ElementsSourcesSection,
+        clock: Clock,
+        *,
+        is_rehearsal: bool,
+        on_asked: Callable[[str, str], None] = lambda _source, _problem: None,
+    ) -> None:
+        """is_rehearsal: at another time than now nothing is fetched.
+
+        on_asked: told the host that was asked and in a word why nothing good came, whichever process asked.
+        """
+        self._on_asked = on_asked
+        self._asked_tai_s: dict[str, float] = {}
         self._config, self._section, self._clock = config, section, clock
         self._is_on = bool(section.urls) and not is_rehearsal
         self._looked_s = -LOOK_S
@@ -49,12 +64,20 @@ class ElementsFetching:
         now_tai_s, section = self._clock.tai_s(), self._section
         self.problem = fetch_problems(self._config, section, now_tai_s)
         is_idle = (self._fetch is None or self._fetch.done()) and now_s >= self._not_before_s
+        states = [read_fetch_state(self._config / section.store, url) for url in section.urls]
+        self._count(states)
         if section.fetch != "daemon" or not is_idle or before_release(now_tai_s):
             return
-        states = [read_fetch_state(self._config / section.store, url) for url in section.urls]
         if any(is_due(one, now_tai_s, section.every_h * HOUR_S) for one in states):
             self.start_count += 1
             self._fetch = asyncio.get_running_loop().create_task(self._run(), name="elements-fetch")
+
+    def _count(self, states: list[FetchState]) -> None:
+        for state in states:
+            before_tai_s, self._asked_tai_s[state.url] = self._asked_tai_s.get(state.url), state.asked_tai_s
+            if before_tai_s is not None and state.asked_tai_s > before_tai_s:
+                problem = "stopped" if state.stopped else "failed" if state.problem else ""
+                self._on_asked(urlsplit(state.url).hostname or "unknown", problem)
 
     async def close(self) -> None:
         """End the process, if one runs; what it has written is whole."""

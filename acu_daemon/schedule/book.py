@@ -33,6 +33,7 @@ class PassState(StrEnum):
 
 
 OPEN = (PassState.PLANNED, PassState.REFUSED)  # what a plan may still change
+OVER = (PassState.DONE, PassState.DEGRADED, PassState.FAILED, PassState.MISSED, PassState.CANCELLED)
 UNDER_WAY = (PassState.PREPASS, PassState.PASS, PassState.POSTPASS)
 
 
