@@ -10,6 +10,7 @@ python=${PYTHON:-python3}
 stamp=.venv/stamp-$(cat constraints.txt pyproject.toml scripts/setup.sh | sha256sum | cut -c1-16)
 if [ ! -e "$stamp" ]; then
     echo "== setting up .venv (once; about a minute)"
+    python=$("$python" -c 'import sys; print(getattr(sys, "_base_executable", sys.executable))') # not the one that goes
     rm -rf .venv
     if ! "$python" -m venv .venv 2>.venv-problem; then
         cat .venv-problem >&2
