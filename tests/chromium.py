@@ -86,14 +86,13 @@ class Tab:
         return answer["result"].get("value")
 
     async def text(self, selector: str) -> str:
-        return str(await self.value(f"document.querySelector({json.dumps(selector)})?.innerText ?? ''"))
+        return str(await self.value(f"document.querySelector({json.dumps(selector)})?.textContent ?? ''"))
 
-    async def until(self, expression: str) -> Any:
+    async def until(self, expression: str) -> None:
         """Wait until an expression is true on the page."""
         async with asyncio.timeout(PATIENCE_S):
-            while not (found := await self.value(expression)):
+            while not await self.value(f"Boolean({expression})"):
                 await asyncio.sleep(0.03)
-        return found
 
     async def size(self, width: int, height: int, *, is_phone: bool = False) -> None:
         await self.call(
@@ -126,6 +125,8 @@ class Tab:
         path.write_bytes(base64.b64decode(answer["data"]))
 
     async def end(self) -> None:
+        """Close it."""
+        await self.call("Page.close")
         self._task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await self._task
@@ -142,7 +143,6 @@ async def chromium() -> AsyncIterator[Callable[[], Awaitable[Tab]]]:
         stderr=subprocess.DEVNULL,
         start_new_session=True,
     )
-    tabs: list[Tab] = []
     try:
         async with aiohttp.ClientSession() as session:
             place = Path(folder) / "DevToolsActivePort"
@@ -154,15 +154,9 @@ async def chromium() -> AsyncIterator[Callable[[], Awaitable[Tab]]]:
             async def tab() -> Tab:
                 async with session.put(f"{base}/json/new?about:blank") as answer:
                     url = (await answer.json())["webSocketDebuggerUrl"]
-                one = Tab(await session.ws_connect(url, max_msg_size=0))
-                tabs.append(one)
-                return one
+                return Tab(await session.ws_connect(url, max_msg_size=0))
 
-            try:
-                yield tab
-            finally:
-                for one in tabs:
-                    await one.end()
+            yield tab
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGTERM)

@@ -137,6 +137,7 @@ class Feed:
     def _now(self, seen: Snapshot) -> dict[str, Any]:
         said, aim = verdict(seen), self._watched.aim()
         return {key: getattr(seen, key) for key in SNAPSHOT_KEYS} | {
+            "verdict": said.word,
             "level": said.level.name,
             "why": said.why,
             "headline": headline(seen),

@@ -1,6 +1,6 @@
 "use strict";
 // The live line: takes the newest state, draws it at the next frame, and says when it hears nothing.
-let line = null, heardAt = 0, now = null, nowAt = 0, newNow = false, retry = 0;
+let line = null, heardAt = 0, now = null, nowAt = 0, newNow = false, retry = 0, pending = {}, isDrawDue = false;
 const state = { backdrop: null, ahead: null, states: [], lateness: null, schedule: [], people: null };
 const LOST_S = 1.0, THEMES = ["", "light", "dark", "night"];
 const THEME_NAMES = { "": "as the system", light: "light", dark: "dark", night: "night, red" };
@@ -44,7 +44,18 @@ function take(said) {
     window.acuSeen = { tick: now.tick_count, tai_s: now.tai_s, at: heardAt }; // for the measurement of latency
     watchStop(now);
   }
-  requestAnimationFrame(() => draw(said));
+  pending = { ...pending, ...said };
+  if (isDrawDue) return;
+  isDrawDue = true;
+  requestAnimationFrame(drawPending);
+  setTimeout(drawPending, 300); // a page behind others is given no frames, and its title shall be true
+}
+function drawPending() {
+  if (!isDrawDue) return;
+  const said = pending;
+  isDrawDue = false;
+  pending = {};
+  draw(said);
 }
 function draw(said) {
   document.body.classList.remove("waiting");
