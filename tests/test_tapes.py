@@ -131,7 +131,9 @@ def test_a_line_that_makes_no_sense_is_told_with_its_number(tmp_path: Path) -> N
     assert "line 52: 'W?'" in done.err
 
 
-@pytest.mark.parametrize("data", [b"", b"utc,az_deg\n", gzip.compress(b'{"format": 99}\n', mtime=0), gzip.compress(b"[]\n", mtime=0)])
+@pytest.mark.parametrize(
+    "data", [b"", b"utc,az_deg\n", gzip.compress(b'{"format": 99}\n', mtime=0), gzip.compress(b"[]\n", mtime=0)]
+)
 def test_what_is_no_recording_is_refused(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / f"none{SUFFIX}"
     path.write_bytes(data)
