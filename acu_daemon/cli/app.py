@@ -43,6 +43,7 @@ COMMANDS = {  # name: module of acu_daemon.cli, and the function in it
     "check": ("check", "command"),
     "latency-test": ("latency_test", "command"),
     "replay": ("replay_recording", "command"),
+    "report": ("report_command", "command"),
     "safe-stop": ("safe_stop", "command"),
     "arm": ("operator_commands", "arm"),
     "disarm": ("operator_commands", "disarm"),

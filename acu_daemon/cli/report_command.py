@@ -1,0 +1,93 @@
+"""`acu-daemon report`: the report of a pass, made from its recording, and the index of a station's passes."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from acu_daemon.cli.outputs import refuse_unwritable
+from acu_daemon.cli.replay_wire import ReplayedPass, replay_pass
+from acu_daemon.edge.tape_file import SUFFIX
+from acu_daemon.edge.writer import replace_file
+from acu_daemon.report.pass_figures import pass_figures
+from acu_daemon.report.pass_page import pass_page
+from acu_daemon.report.pass_watch import PassWatch
+from acu_daemon.report.passes_index import index_figures, index_page
+
+INDEX = "index"
+
+
+def command(
+    recordings: Annotated[
+        list[Path], typer.Argument(metavar="FILE...", help="Recordings of passes, or the directory in which they are.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Where the reports go.  Default: beside each recording.")
+    ] = None,
+) -> None:
+    """Make the report of recorded passes: FILE.html and FILE.json, and index.html with all reports of the directory.
+
+    The page has no outside parts; every figure on it is in the JSON.
+
+    Exit status: 0; 1 a recording does not replay as the daemon decided, so that its report may be wrong; 2 wrong use.
+    """
+    files = [path for given in recordings for path in _recordings(given)]
+    if not files:
+        typer.echo(f"no recordings (*{SUFFIX}) there", err=True)
+        raise typer.Exit(2)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+    differing = 0
+    for path in files:
+        done, page = make_report(path, out or path.parent)
+        typer.echo(page)
+        if done.difference is not None:
+            differing += 1
+            typer.echo(f"{path}: the replay decides otherwise: {done.difference}", err=True)
+    for folder in {out or path.parent for path in files}:
+        typer.echo(write_index(folder))
+    if differing:
+        raise typer.Exit(1)
+
+
+def _recordings(given: Path) -> list[Path]:
+    return sorted(given.glob(f"*{SUFFIX}")) if given.is_dir() else [given]
+
+
+def make_report(path: Path, folder: Path) -> tuple[ReplayedPass, Path]:
+    """Replay a recording, and write what it shows.  UsageError: it is none, or the report cannot be written."""
+    watch = PassWatch()
+    done = replay_pass(path, watch)
+    target = done.taped.target
+    figures = pass_figures(done.taped.job, target.station, target.satellite, watch, is_whole=done.is_whole)
+    figures["replay"] = {
+        "is_same": done.difference is None,
+        "difference": None if done.difference is None else str(done.difference),
+    }
+    name = path.name.removesuffix(SUFFIX)
+    page, data = folder / f"{name}.html", folder / f"{name}.json"
+    refuse_unwritable(page, data)
+    replace_file(data, f"{json.dumps(figures, allow_nan=False)}\n".encode())
+    replace_file(page, pass_page(figures).encode())
+    return done, page
+
+
+def write_index(folder: Path) -> Path:
+    """Write the page of all reports in a directory."""
+    reports: list[tuple[str, dict[str, Any]]] = []
+    for path in sorted(folder.glob("*.json")):
+        if path.stem == INDEX:
+            continue
+        try:
+            read = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            continue
+        if isinstance(read, dict) and "outcome" in read and "curves" in read:
+            reports.append((path.stem, read))
+    index = index_figures(reports)
+    page = folder / f"{INDEX}.html"
+    refuse_unwritable(page)
+    replace_file(folder / f"{INDEX}.json", f"{json.dumps(index, allow_nan=False)}\n".encode())
+    replace_file(page, index_page(index).encode())
+    return page
