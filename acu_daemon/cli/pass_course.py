@@ -78,6 +78,11 @@ class PassCourse:
             self._take_results(results)
             self._see_pass(self.entry, seen)
 
+    @property
+    def hook_results(self) -> list[HookResult]:
+        """How the hooks of the pass ended, so far."""
+        return self._tracked.hooks
+
     def _take_results(self, results: list[HookResult]) -> None:
         self._tracked.hooks += results
         for result in results:

@@ -1,5 +1,6 @@
 """The recording of a run: begun with it, closed after it."""
 
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -9,11 +10,14 @@ import structlog
 from acu_daemon.cli.options import Target
 from acu_daemon.cli.tape_head import head_of
 from acu_daemon.daemon.service import PassJob
+from acu_daemon.edge.hooks import HookResult
 from acu_daemon.edge.kept_tapes import PASSES, KeepRules, remove_old, tape_name
 from acu_daemon.edge.link import Link
 from acu_daemon.edge.tape_file import TapeFile
 from acu_daemon.edge.writer import Writer
 from acu_daemon.errors import ElementsError
+
+SAID_CHARACTERS = 300
 
 
 def begin_tape(
@@ -32,6 +36,14 @@ def begin_tape(
         log.warning("tape.ended", reason=str(error))
         return None
     return TapeFile(folder / tape_name(job.coming.rise_tai_s, job.satellite), head, files)
+
+
+def note_hooks(tape: TapeFile, results: Iterable[HookResult]) -> None:
+    """Put how hooks ended into a recording, for its report."""
+    for one in results:
+        lasted_s = round(one.lasted_s, 2)
+        said = {"hook": str(one.hook), "status": one.status, "lasted_s": lasted_s, "problem": one.problem}
+        tape.note(("I", "hook", {**said, "said": one.said.strip()[-SAID_CHARACTERS:]}))
 
 
 def _remove_old(folder: Path, rules: KeepRules) -> None:

@@ -25,6 +25,10 @@ def command(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Where the reports go.  Default: beside each recording.")
     ] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option("--config", help="The station's directory, for a [recording] send_to that stands beside it."),
+    ] = None,
 ) -> None:
     """Make the report of recorded passes: FILE.html and FILE.json, and index.html with all reports of the directory.
 

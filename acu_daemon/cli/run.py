@@ -36,6 +36,7 @@ from acu_daemon.cli.outlets_beside import Outlets
 from acu_daemon.cli.page import PageFrame, RunningPage, WatchedRuns, Web, chosen_page
 from acu_daemon.cli.pass_tape import begin_tape
 from acu_daemon.cli.rehearsal import clock_text, meet_in_rehearsal, met_by_chance
+from acu_daemon.cli.report_after import AT_THE_END_S, report_after
 from acu_daemon.cli.run_setup import Prepared, RunSetup, prepare
 from acu_daemon.cli.run_station import run_station
 from acu_daemon.cli.station_setup import StationSetup, first_usable
@@ -43,6 +44,7 @@ from acu_daemon.cli.weather_watch import WeatherWatch
 from acu_daemon.config.load import load_station
 from acu_daemon.config.to_settings import driver_of
 from acu_daemon.control.state import ControlState
+from acu_daemon.control.tracking.pass_plan import PASS_OVER
 from acu_daemon.daemon.background import fit_deadline_s
 from acu_daemon.daemon.health import Health
 from acu_daemon.daemon.live import LiveLine
@@ -329,7 +331,11 @@ async def _run(
     gc.freeze()  # a full collection over the start-up heap would stall a tick by tens of milliseconds
     sync = asyncio.create_task(clock.watch_synchronisation())
     try:
-        return await runs.run()
+        outcome = await runs.run()
+        if tape is not None and outcome.reason == PASS_OVER and now.target.station.recording.report:
+            tape.close()
+            await report_after(tape, frame.files, frame.config, AT_THE_END_S)
+        return outcome
     finally:
         sync.cancel()
         await fetching.close()

@@ -1,14 +1,16 @@
 """What a running station is made from, and what stays the same while it runs."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from acu_daemon.assist.session.refit import RefitReply, RefitRequest
 from acu_daemon.cli.options import Target, load_target
 from acu_daemon.cli.page import PageFrame
 from acu_daemon.cli.pass_checks import Check
+from acu_daemon.cli.report_after import report_after
 from acu_daemon.cli.station_wind import Beside
 from acu_daemon.config.load import satellite_names
 from acu_daemon.daemon.background import fit_deadline_s
@@ -16,6 +18,7 @@ from acu_daemon.daemon.service import PassJob
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.fit import FitRunner, ProcessFitRunner
 from acu_daemon.edge.link import Link
+from acu_daemon.edge.tape_file import TapeFile
 from acu_daemon.edge.writer import Job, Writer
 from acu_daemon.errors import AcuDaemonError, UsageError
 
@@ -36,6 +39,8 @@ class StationSetup:
     beside: Beside = asyncio.to_thread
     put: Callable[[Job], object] = lambda job: job()  # writes the schedule: by a queue, where the loop must not wait
     check: Check | None = None  # of a satellite at a TAI; None: as `acu-daemon check`
+    is_recording: bool = True  # what [recording] of station.toml asks for
+    report: Callable[[TapeFile, Writer, Path], Coroutine[Any, Any, None]] = report_after
     make_runner: Callable[[PassJob], FitRunner] = lambda job: ProcessFitRunner(
         job.refit, fit_deadline_s(job.low_water_s)
     )

@@ -111,7 +111,17 @@ def run_days(
 
         files = Writer("files")
         setup = StationSetup(
-            config, clock, link, directory, files, math.inf, False, beside=beside, make_runner=runner, check=check
+            config,
+            clock,
+            link,
+            directory,
+            files,
+            math.inf,
+            False,
+            beside=beside,
+            make_runner=runner,
+            check=check,
+            is_recording=False,
         )
         runs = StationRuns(setup, first, None)
         loop, killed = asyncio.get_running_loop(), loop_future()

@@ -85,10 +85,12 @@ class TapeReplay:
         self.is_ended = False
 
     def run(self, records: Iterable[Record]) -> Difference | None:
-        """Replay until the run's end or the first difference, which is returned."""
+        """Replay until the run's end or the first difference, which is returned.  Facts for a report may come later."""
         for record in records:
+            if self.is_ended and record[0] != "I":
+                continue
             self._take(record)
-            if self.difference is not None or self.is_ended:
+            if self.difference is not None:
                 break
         return self.difference
 

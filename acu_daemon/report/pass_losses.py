@@ -9,7 +9,6 @@ from acu_daemon.report.pass_watch import SeenReading
 
 LEAST_S = 0.25  # one reading without the bit is no loss
 HALF_DB = 3.0  # a level that is lower than autotrack's by less: the satellite is within half the beam
-LEAST_SHARE = 0.02  # of a loss: a state that was on for less is that of the tick before
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,14 +63,13 @@ def _loss(
     if acquired_tai_s is not None:  # the last time that the signal came, and stayed until it was acquired
         silent = [one.tai_s for one in during if not has_signal(one)]
         back = next((one.tai_s for one in during if not silent or one.tai_s > silent[-1]), acquired_tai_s)
-    states = Counter(one.state for one in during)
+    known = during[1:] or during  # the decision knows of a loss from its first reading on
+    states = Counter(one.state for one in known)
     off = [one.off_path_deg for one in during if one.off_path_deg is not None]
     return SignalLoss(
         start_tai_s,
         None if back is None else back - start_tai_s,
         None if back is None or acquired_tai_s is None else acquired_tai_s - back,
-        tuple(
-            (state, count / len(during)) for state, count in states.most_common() if count >= LEAST_SHARE * len(during)
-        ),
+        tuple((state, count / len(known)) for state, count in states.most_common()),
         max(off, default=None),
     )

@@ -19,6 +19,7 @@ from acu_daemon.pointing.turn_plan import TurnAsk, TurnPlan, plan_turns
 from acu_daemon.pointing.wrap import choose_turn, judged, middle_deg
 from acu_daemon.units import Array
 
+PASS_OVER = "pass over"
 STEERED = AUTOTRACKING | {TrackState.PROGRAM}
 COARSE_STEP_S, MOST_STEPS = 0.5, 20000  # of these a tenth of a second's work, in the loop
 ANY_ELEVATION = AxisLimits(-90.0, 180.0, 1.0, 1.0)
@@ -158,4 +159,4 @@ def why_over(sky: Sky, now_tai_s: float, end_tai_s: float) -> str:
     if now_tai_s >= end_tai_s:
         return "duration over"
     is_over = sky.plan is not None and now_tai_s > pass_end_tai_s(sky.plan, sky)
-    return "pass over" if is_over else ""
+    return PASS_OVER if is_over else ""
