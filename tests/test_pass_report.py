@@ -20,7 +20,7 @@ from acu_daemon.edge.tape_file import SUFFIX
 from acu_daemon.report.pass_losses import losses_of
 from acu_daemon.report.pass_page import pass_page, verdict_of
 from acu_daemon.report.pass_watch import SeenReading
-from acu_daemon.report.svg_chart import Curve, chart, nice, sparkline
+from acu_daemon.report.svg_chart import ChartLine, chart, nice, sparkline
 
 MOST_BYTES = 1_000_000
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?(?![\w.])")
@@ -208,7 +208,7 @@ def test_one_reading_without_the_bit_is_no_loss_and_one_that_does_not_end_has_no
 
 
 def test_a_curve_is_broken_where_nothing_is_known() -> None:
-    curve = Curve("a", [0.0, 1.0, 2.0, 3.0, 20.0], [1.0, None, 2.0, 3.0, 4.0], "a")
+    curve = ChartLine("a", [0.0, 1.0, 2.0, 3.0, 20.0], [1.0, None, 2.0, 3.0, 4.0], "a")
     drawn = chart("t", "deg", [curve])
     (path,) = re.findall(r'class="line a" d="([^"]*)"', drawn)
     assert path.count("M") == 3

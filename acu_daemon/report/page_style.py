@@ -13,7 +13,7 @@ h3{font-size:14px;margin:16px 0 4px;color:var(--dim);font-weight:600}p{margin:6p
 .mark-line{background:var(--watch);color:var(--paper);padding:2px 10px;border-radius:3px;
 font-weight:700;letter-spacing:.06em}
 .verdict{font-weight:700}.verdict.good{color:var(--good)}.verdict.bad{color:var(--bad)}.verdict.watch{color:var(--watch)}
-.tiles{display:grid;grid-template-columns:repeat(auto-fill,minmax(158px,1fr));gap:10px;margin:18px 0}
+.tiles{display:grid;grid-template-columns:repeat(auto-fill,minmax(230px,1fr));gap:10px;margin:18px 0}
 .tile{background:var(--card);border:1px solid var(--rule);border-radius:6px;padding:8px 12px}
 .tile b{display:block;font-size:21px;font-weight:650;font-variant-numeric:tabular-nums}
 .tile span{color:var(--dim);font-size:13px}.two{display:grid;grid-template-columns:360px 1fr;gap:26px;align-items:start}

@@ -130,9 +130,9 @@ def _plan(job: PassJob, watch: PassWatch) -> dict[str, Any] | None:
     coming, plan = job.coming, watch.plan
     if coming is None:
         return None
-    highest = max(watch.readings, key=lambda one: one.el_deg, default=None)
     crossing = plan.crossing if plan is not None else None
     seen = [one for one in watch.readings if coming.rise_tai_s <= one.tai_s <= coming.set_tai_s]
+    highest = max(seen, key=lambda one: one.el_deg, default=None)
     zenith = [one for one in watch.readings if one.state == TrackState.ZENITH]
     out_s = _seconds([one for one in seen if _is_out(one, job.control.beamwidth_deg)])
     return {
@@ -361,7 +361,8 @@ def _curves(watch: PassWatch, beam_deg: float) -> dict[str, Any]:
     slowest = [max((latency[k] for k in slot), key=lambda one: one[1]) for slot in slots]
     return {
         "zero_utc": utc_text(zero, 3),
-        "zero_tai_s": zero,
+        "rise_t_s": None if watch.plan is None else _r(watch.plan.rise_tai_s - zero, 1),
+        "set_t_s": None if watch.plan is None else _r(watch.plan.set_tai_s - zero, 1),
         "path": {
             "t_s": [_r(one.tai_s - zero, 1) for one in worst],
             "az_deg": [_r(one.az_deg, 2) for one in worst],

@@ -91,7 +91,14 @@ def _sky_and_plan(figures: Figures) -> str:
     plan, outcome, path = figures["plan"], figures["outcome"], figures["curves"].get("path")
     sky = ""
     if path:
-        sky = sky_chart("Path over the station, north up", path["az_deg"], path["el_deg"], path["is_acquired"])
+        from_s, to_s = figures["curves"]["rise_t_s"], figures["curves"]["set_t_s"]
+        shown = [
+            k
+            for k, t_s in enumerate(path["t_s"])
+            if (from_s is None or from_s <= t_s) and (to_s is None or t_s <= to_s)
+        ]
+        values = ([path[name][k] for k in shown] for name in ("az_deg", "el_deg", "is_acquired"))
+        sky = sky_chart("Path over the station, north up", *values)
         sky += (
             '<p class="dim"><span class="key good"></span>acquired<span class="key bad"></span>not acquired; '
             "open circle: where it began</p>"

@@ -5,7 +5,7 @@ from html import escape
 
 from acu_daemon.control.tracking.state_table import AUTOTRACKING, HOLDING, TrackState
 from acu_daemon.report.page_parts import Figures, or_none, table, text, time_of_day
-from acu_daemon.report.svg_chart import Band, Curve, chart
+from acu_daemon.report.svg_chart import ChartBand, ChartLine, chart
 
 HALF_BEAM = 0.5
 
@@ -17,9 +17,9 @@ def _kind(state: str) -> str:
     return "hold" if track in HOLDING or track is TrackState.ZENITH else "search" if "SEARCH" in state else "other"
 
 
-def _bands(figures: Figures) -> list[Band]:
+def _bands(figures: Figures) -> list[ChartBand]:
     return [
-        Band(one["t_s"], one["t_s"] + one["lasted_s"], _kind(one["state"]), f"{one['state']}, {one['lasted_s']} s")
+        ChartBand(one["t_s"], one["t_s"] + one["lasted_s"], _kind(one["state"]), f"{one['state']}, {one['lasted_s']} s")
         for one in figures["states"]
     ]
 
@@ -41,20 +41,20 @@ def course_section(figures: Figures) -> str:
         "Distance from the path in beamwidths",
         "beamwidths off the path",
         [
-            Curve("3 sigma of the prediction", off["t_s"], _times(off["sigma_beamwidths"], 3.0), "b"),
-            Curve("off the path", off["t_s"], _held(off["beamwidths"]), "a"),
+            ChartLine("3 sigma of the prediction", off["t_s"], _times(off["sigma_beamwidths"], 3.0), "b"),
+            ChartLine("off the path", off["t_s"], _held(off["beamwidths"]), "a"),
         ],
         marks=[(HALF_BEAM, "half the beam")],
         from_zero=True,
         **base,
     )
     elevation = chart(
-        "Elevation", "elevation °", [Curve("elevation", path["t_s"], path["el_deg"], "a")], height=130.0, **base
+        "Elevation", "elevation °", [ChartLine("elevation", path["t_s"], path["el_deg"], "a")], height=130.0, **base
     )
     signal = ""
     if any(one is not None for one in level["db"]):
         signal = chart(
-            "Signal level", "level dB", [Curve("level", level["t_s"], level["db"], "a")], height=130.0, **base
+            "Signal level", "level dB", [ChartLine("level", level["t_s"], level["db"], "a")], height=130.0, **base
         )
     key = (
         '<p class="dim"><span class="key auto"></span>autotrack<span class="key hold"></span>held on the prediction'
@@ -104,8 +104,8 @@ def residuals_section(figures: Figures) -> str:
                 f"Residuals {what}",
                 "°",
                 [
-                    Curve("cross elevation", curve["t_s"], curve["cross_elevation_deg"], "a", has_dots=True),
-                    Curve("elevation", curve["t_s"], curve["elevation_deg"], "b", has_dots=True),
+                    ChartLine("cross elevation", curve["t_s"], curve["cross_elevation_deg"], "a", has_dots=True),
+                    ChartLine("elevation", curve["t_s"], curve["elevation_deg"], "b", has_dots=True),
                 ],
                 zero_s_of_day=_zero_s(figures),
                 span_s=_span(figures["curves"]["path"]["t_s"]),
@@ -142,13 +142,13 @@ def correction_section(figures: Figures) -> str:
     along = chart(
         "Correction along the track",
         "s along",
-        [Curve("along", curve["t_s"], curve["along_s"], "a", curve["along_sigma_s"])],
+        [ChartLine("along", curve["t_s"], curve["along_s"], "a", curve["along_sigma_s"])],
         **base,
     )
     across = chart(
         "Correction across the track",
         "° across",
-        [Curve("across", curve["t_s"], curve["across_deg"], "b", curve["across_sigma_deg"])],
+        [ChartLine("across", curve["t_s"], curve["across_deg"], "b", curve["across_sigma_deg"])],
         **base,
     )
     rows = [
@@ -178,7 +178,7 @@ def line_section(figures: Figures) -> str:
         drawn = chart(
             "Latency of the exchanges",
             "ms, slowest of each slot",
-            [Curve("latency", curve["t_s"], curve["ms"], "a")],
+            [ChartLine("latency", curve["t_s"], curve["ms"], "a")],
             zero_s_of_day=_zero_s(figures),
             span_s=_span(figures["curves"]["path"]["t_s"]),
             height=130.0,

@@ -15,11 +15,12 @@ GAP_S = 5.0  # a curve is broken where nothing is known for so long
 ROUND = (1.0, 2.0, 2.5, 5.0, 10.0)
 MINUTES = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0)
 MOST_TICKS = 14
+LABEL = 12.0  # half the width of a time below the axis
 LEAST_SPAN = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Curve:
+class ChartLine:
     """Values over seconds.  sigma: a band of 1 sigma to both sides; has_dots: points, and no line between them."""
 
     label: str
@@ -31,7 +32,7 @@ class Curve:
 
 
 @dataclass(frozen=True, slots=True)
-class Band:
+class ChartBand:
     """A span of time behind the curves."""
 
     from_s: float
@@ -41,7 +42,7 @@ class Band:
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class ChartFrame:
     """How time and values lie on the paper."""
 
     from_s: float
@@ -61,9 +62,9 @@ class Frame:
 def chart(
     title: str,
     unit: str,
-    curves: Sequence[Curve],
+    curves: Sequence[ChartLine],
     *,
-    bands: Sequence[Band] = (),
+    bands: Sequence[ChartBand] = (),
     marks: Sequence[tuple[float, str]] = (),
     zero_s_of_day: float = 0.0,
     span_s: tuple[float, float] | None = None,
@@ -85,13 +86,13 @@ def chart(
 
 
 def _frame(
-    curves: Sequence[Curve],
+    curves: Sequence[ChartLine],
     marks: Sequence[tuple[float, str]],
     span_s: tuple[float, float] | None,
     height: float,
     *,
     from_zero: bool,
-) -> Frame:
+) -> ChartFrame:
     values = [one for curve in curves for one in curve.values if one is not None] + [value for value, _ in marks]
     times = [t for curve in curves for t in curve.t_s]
     low, high = min(values, default=0.0), max(values, default=1.0)
@@ -99,10 +100,10 @@ def _frame(
     margin = 0.06 * (high - low) or 0.5 * abs(high) or 1.0
     low, high = (low if from_zero and low == 0.0 else low - margin), high + margin
     from_s, to_s = span_s or (min(times, default=0.0), max(times, default=1.0))
-    return Frame(from_s, to_s, low, high, height)
+    return ChartFrame(from_s, to_s, low, high, height)
 
 
-def _bands(frame: Frame, bands: Sequence[Band]) -> Iterator[str]:
+def _bands(frame: ChartFrame, bands: Sequence[ChartBand]) -> Iterator[str]:
     for band in bands:
         begin, end = max(band.from_s, frame.from_s), min(band.to_s, frame.to_s)
         if end > begin:
@@ -114,7 +115,7 @@ def _bands(frame: Frame, bands: Sequence[Band]) -> Iterator[str]:
             )
 
 
-def _grid(frame: Frame, unit: str, zero_s_of_day: float) -> Iterator[str]:
+def _grid(frame: ChartFrame, unit: str, zero_s_of_day: float) -> Iterator[str]:
     bottom = frame.height - BOTTOM
     for value in nice(frame.low, frame.high, 5):
         y = frame.y(value)
@@ -123,11 +124,12 @@ def _grid(frame: Frame, unit: str, zero_s_of_day: float) -> Iterator[str]:
     for t_s, text in _minutes(frame, zero_s_of_day):
         x = frame.x(t_s)
         yield f'<line class="grid" x1="{x:.1f}" x2="{x:.1f}" y1="{TOP:.0f}" y2="{bottom:.0f}"/>'
-        yield f'<text class="axis" x="{x:.1f}" y="{frame.height - 7:.0f}" text-anchor="middle">{text}</text>'
+        if x <= WIDTH - RIGHT - LABEL:
+            yield f'<text class="axis" x="{x:.1f}" y="{frame.height - 7:.0f}" text-anchor="middle">{text}</text>'
     yield f'<text class="axis unit" x="{LEFT:.0f}" y="{TOP - 9:.0f}">{escape(unit)}</text>'
 
 
-def _minutes(frame: Frame, zero_s_of_day: float) -> Iterator[tuple[float, str]]:
+def _minutes(frame: ChartFrame, zero_s_of_day: float) -> Iterator[tuple[float, str]]:
     span_min = (frame.to_s - frame.from_s) / 60.0
     step_s = 60.0 * next((one for one in MINUTES if span_min / one <= MOST_TICKS), span_min / MOST_TICKS)
     k = ceil((frame.from_s + zero_s_of_day) / step_s)
@@ -151,7 +153,7 @@ def _short(value: float) -> str:
     return f"{0.0 if abs(value) < LEAST_SPAN else value:.4g}"
 
 
-def _mark(frame: Frame, value: float, label: str) -> str:
+def _mark(frame: ChartFrame, value: float, label: str) -> str:
     y = frame.y(value)
     return (
         f'<line class="mark" x1="{LEFT:.0f}" x2="{WIDTH - RIGHT:.0f}" y1="{y:.1f}" y2="{y:.1f}"/>'
@@ -159,7 +161,7 @@ def _mark(frame: Frame, value: float, label: str) -> str:
     )
 
 
-def _runs(curve: Curve) -> Iterator[list[int]]:
+def _runs(curve: ChartLine) -> Iterator[list[int]]:
     """Points that belong together: none missing, no gap in time."""
     run: list[int] = []
     for k, value in enumerate(curve.values):
@@ -173,7 +175,7 @@ def _runs(curve: Curve) -> Iterator[list[int]]:
         yield run
 
 
-def _line(frame: Frame, curve: Curve) -> str:
+def _line(frame: ChartFrame, curve: ChartLine) -> str:
     points = [[(frame.x(curve.t_s[k]), frame.y(curve.values[k] or 0.0)) for k in run] for run in _runs(curve)]
     if curve.has_dots:
         path = "".join(f"M{x:.1f} {y:.1f}h0" for run in points for x, y in run)
@@ -182,7 +184,7 @@ def _line(frame: Frame, curve: Curve) -> str:
     return f'<path class="line {curve.kind}" d="{path}"><title>{escape(curve.label)}</title></path>'
 
 
-def _sigma(frame: Frame, curve: Curve) -> str:
+def _sigma(frame: ChartFrame, curve: ChartLine) -> str:
     sigma = curve.sigma or ()
     path = ""
     for run in _runs(curve):
@@ -192,7 +194,7 @@ def _sigma(frame: Frame, curve: Curve) -> str:
     return f'<path class="sigma {curve.kind}" d="{path}"><title>1 sigma of {escape(curve.label)}</title></path>'
 
 
-def _held(y: float, frame: Frame) -> float:
+def _held(y: float, frame: ChartFrame) -> float:
     return min(max(y, TOP), frame.height - BOTTOM)
 
 
