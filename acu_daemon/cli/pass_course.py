@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import structlog
 
 from acu_daemon.cli.schedule_keeper import ScheduleKeeper
+from acu_daemon.control.phantom import PhantomPass
 from acu_daemon.daemon.service import Outcome
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.daemon.verdict import alarms
@@ -39,6 +40,7 @@ class Tracked:
     words: list[str] = field(default_factory=list)  # what else there is to say of it, each once
     hooks: list[HookResult] = field(default_factory=list)
     cancelled_by: str = ""
+    phantom: PhantomPass | None = None
     nudge: KeptNudge | None = None  # in force now
     is_nudge_kept: bool = False
 
@@ -56,12 +58,13 @@ class PassCourse:
         self._tracked = Tracked()
         self._alarms: frozenset[str] = frozenset()
         self.entry: Entry | None = None
+        self.record: dict[str, Any] = {}  # of the pass that is over, for its report; JSON
         self._nudges: dict[str, KeptNudge] = {}  # of satellites, until the process ends
         self._log: Any = structlog.get_logger("station")
 
-    def begun(self, entry: Entry) -> None:
-        """The run of a pass begins."""
-        self._tracked = Tracked()
+    def begun(self, entry: Entry, phantom: PhantomPass | None) -> None:
+        """The run of a pass begins.  phantom: what was found of it before."""
+        self._tracked = Tracked(phantom=phantom)
         self.entry = self._keeper.change(entry, PassState.PREPASS, "")
         self._hooks.call(Hook.BEFORE_PASS, self._about(entry))
         self._hooks.call(Hook.DURING_PASS, self._about(entry))
@@ -119,8 +122,8 @@ class PassCourse:
         state, why = self._judged(entry, outcome, reason)
         changed = self._keeper.change(entry, state, why)
         self._hooks.end_during()
-        about = {"state": str(state), "reason": why, "locked_s": round(self._tracked.locked_s, 1)}
-        self._hooks.call(Hook.AFTER_PASS, self._about(changed) | about)
+        self.record = self._about(changed) | self._recorded(state, why)
+        self._hooks.call(Hook.AFTER_PASS, self.record)
         self._log.info("pass.done", entry=changed.name, state=str(state), reason=why)
         self.entry = None
 
@@ -145,6 +148,16 @@ class PassCourse:
             self._nudges[satellite] = tracked.nudge
         elif tracked.is_nudge_kept or tracked.nudge is None:  # undone, or what it mended is in a fit
             self._nudges.pop(satellite, None)
+
+    def _recorded(self, state: PassState, why: str) -> dict[str, Any]:
+        tracked = self._tracked
+        return {
+            "state": str(state),
+            "reason": why,
+            "locked_s": round(tracked.locked_s, 1),
+            "phantom": None if tracked.phantom is None else tracked.phantom.record,
+            "hooks": [asdict(one) for one in tracked.hooks],
+        }
 
     def _judged(self, entry: Entry, outcome: Outcome | None, reason: str) -> tuple[PassState, str]:
         if outcome is None:

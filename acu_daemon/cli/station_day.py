@@ -22,11 +22,12 @@ from acu_daemon.cli.next_rise import NextRise
 from acu_daemon.cli.options import Target, coming_pass, load_target, longest_lead
 from acu_daemon.cli.pass_checks import Check, PassChecks
 from acu_daemon.cli.pass_course import PassCourse
+from acu_daemon.cli.phantom_check import PhantomCheck
 from acu_daemon.cli.schedule_keeper import ScheduleKeeper
 from acu_daemon.cli.station_wind import Beside, StationWind
 from acu_daemon.config.station_tables import StationFile
 from acu_daemon.control.tick_input import StowBy, StowWish
-from acu_daemon.daemon.snapshot import Snapshot
+from acu_daemon.daemon.snapshot import Snapshot, StationFacts
 from acu_daemon.daemon.tally import Tally
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.elements_fetching import ElementsFetching
@@ -52,11 +53,15 @@ class StationDay:
         *,
         beside: Beside = asyncio.to_thread,
         check: Check | None = None,
+        has_phantom: bool = True,
         is_rehearsal: bool = False,
         tally: Tally | None = None,
         on_asked: Callable[[str, str], None] = lambda _source, _problem: None,
     ) -> None:
-        """beside: does what takes long, beside the loop.  check: what of a pass is a no-go; None: files and ACU."""
+        """beside: does what takes long, beside the loop.  check: what of a pass is a no-go; None: files and ACU.
+
+        has_phantom: each pass is flown before it.
+        """
         self._is_rehearsal = is_rehearsal
         self.config, self._clock, self._directory = config, clock, file.path.parent
         self._tally = Tally() if tally is None else tally
@@ -67,6 +72,8 @@ class StationDay:
         self.keeper = ScheduleKeeper(config, clock, file, station, beside, self._tally)
         self.course = PassCourse(self.keeper, self.hooks, self.about)
         self.checks = PassChecks(check or self._no_gos, beside, self._tell_no_go)
+        self.phantom = PhantomCheck(config, self._directory, beside) if has_phantom else None
+        self._place: tuple[float, float] | None = None  # of the newest reading
         self._next_rise = NextRise(config, self._directory, beside)
         self.wind = StationWind(station.wind, config, beside)
         self.stow_by = StowBy.NOBODY
@@ -108,19 +115,21 @@ class StationDay:
         if entry is None or entry.start_tai_s is None or entry.end_tai_s is None:
             return ""
         self.checks.look(entry, now_tai_s)
+        if self.phantom is not None:
+            self.phantom.look(entry, now_tai_s, self._place)
         if entry.start_tai_s - now_tai_s > self._lead_s(entry) or not self.checks.may_begin(now_tai_s):
             return ""
-        if why := self._why_not_now():
+        if why := self._why_not_now(entry):
             self._refuse(entry, now_tai_s, why)
             return ""
         return f"{entry.name} begins"
 
-    def _why_not_now(self) -> str:
+    def _why_not_now(self, entry: Entry) -> str:
         if self.wind.seen.wants_stow:
             return self.wind.seen.words
         if self.stow_by not in (StowBy.NOBODY, StowBy.SCHEDULE):
             return f"stowed by the {self.stow_by}"
-        return self.checks.no_go
+        return self.checks.no_go or (self.phantom.no_go(entry) if self.phantom is not None else "")
 
     def _lead_s(self, entry: Entry) -> float:
         target = self._good.get(entry.satellite)
@@ -166,12 +175,23 @@ class StationDay:
     def begun(self, entry: Entry) -> None:
         """The run of a pass begins."""
         self.checks.forget()
-        self.course.begun(entry)
+        self.course.begun(entry, self.phantom.of(entry) if self.phantom is not None else None)
 
     def see(self, seen: Snapshot) -> None:
         """Take the newest snapshot, of a pass or between passes."""
         self.stow_by = StowBy(seen.stow_by)
+        if seen.az_deg is not None and seen.el_deg is not None:
+            self._place = seen.az_deg, seen.el_deg
         self.course.see(seen)
+
+    def facts(self) -> StationFacts:
+        """What is shown of the station beside the run."""
+        until_tai_s = self.keeper.words.pause_until_tai_s
+        return StationFacts(
+            wind=self.wind.seen.words,
+            phantom=self.phantom.words if self.phantom is not None else "",
+            paused_until_utc=utc_text(until_tai_s, 0) if until_tai_s > self._clock.tai_s() else "",
+        )
 
     def about(self, entry: Entry) -> dict[str, Any]:
         """What hooks are told."""
@@ -212,4 +232,6 @@ class StationDay:
         self.wind.close()
         self.checks.close()
         self._next_rise.close()
+        if self.phantom is not None:
+            self.phantom.close()
         self.keeper.close()

@@ -38,6 +38,7 @@ class StationSetup:
     page: PageFrame | None = None
     beside: Beside = asyncio.to_thread
     put: Callable[[Job], object] = lambda job: job()  # writes the schedule: by a queue, where the loop must not wait
+    has_phantom: bool = True
     check: Check | None = None  # of a satellite at a TAI; None: as `acu-daemon check`
     is_recording: bool = True  # what [recording] of station.toml asks for
     report: Callable[[TapeFile, Writer, Path], Coroutine[Any, Any, None]] = report_after

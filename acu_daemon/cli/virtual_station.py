@@ -75,6 +75,7 @@ def run_days(
     script: Sequence[tuple[float, Action]] = (),
     check: Callable[[str, float], list[str]] = lambda _name, _tai_s: [],
     errors: SkyErrors = ERRORS,
+    has_phantom: bool = False,
 ) -> Days:
     """Run the station from one TAI to another; directory: its state.  script: what happens, each at its TAI.
 
@@ -122,6 +123,7 @@ def run_days(
             make_runner=runner,
             check=check,
             is_recording=False,
+            has_phantom=has_phantom,
         )
         runs = StationRuns(setup, first, None)
         loop, killed = asyncio.get_running_loop(), loop_future()

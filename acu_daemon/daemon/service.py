@@ -27,7 +27,7 @@ from acu_daemon.daemon.drawing import DrawingBoard
 from acu_daemon.daemon.foreground import Foreground
 from acu_daemon.daemon.operator_requests import Hands
 from acu_daemon.daemon.port import AcuPort
-from acu_daemon.daemon.snapshot import Snapshot, Subject
+from acu_daemon.daemon.snapshot import Snapshot, StationFacts, Subject
 from acu_daemon.daemon.taking import take_snapshot
 from acu_daemon.daemon.tally import RunFigures, Tally
 from acu_daemon.edge.clock import Clock
@@ -122,6 +122,7 @@ class Service:
         on_state: Callable[[ControlState], None] | None = None,
         files_alarm: Callable[[], str] = str,
         elements_problem: Callable[[], str] = str,
+        facts: Callable[[], StationFacts] = StationFacts,
         on_end: Callable[[], None] | None = None,
         why_anew: Callable[[bool, float], str] | None = None,
         signal: SignalSource | None = None,
@@ -146,6 +147,7 @@ class Service:
         self._on_end = on_end
         self._files_alarm = files_alarm
         self._elements_problem = elements_problem
+        self._facts = facts
         self._why_anew = why_anew
         self._signal: SignalSource | None = signal
         if signal is None and job.signal_udp is not None:
@@ -367,6 +369,7 @@ class Service:
                 self._job.elements,
                 self._elements_problem(),
                 self._job.next_passes,
+                self._facts(),
             ),
             is_rehearsal=self._job.is_rehearsal,
             files_alarm=self._files_alarm(),

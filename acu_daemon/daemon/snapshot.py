@@ -11,6 +11,15 @@ from acu_daemon.model import Pass
 
 
 @dataclass(frozen=True, slots=True)
+class StationFacts:
+    """What a station adds to what is shown of a run."""
+
+    wind: str = ""
+    phantom: str = ""
+    paused_until_utc: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Subject:
     """What a run is about."""
 
@@ -21,6 +30,7 @@ class Subject:
     elements: str = ""
     elements_problem: str = ""
     next_passes: tuple[str, ...] = ()
+    facts: StationFacts = StationFacts()
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +114,9 @@ class Snapshot:
     set_in_s: float | None = None
     culmination_deg: float | None = None
     next_passes: tuple[str, ...] = ()  # after this one: satellite, rise, highest elevation, for people
+    wind: str = ""  # what is known of it, where it is watched
+    phantom: str = ""  # what the phantom pass has found of the next pass, or of this one
+    paused_until_utc: str = ""  # no pass is begun until then
     zenith: str = ""  # what crossing it is expected to cost, until it is past
     sun_deg: float | None = None  # between boresight and sun; None where sun_policy is off
     sun_reach_s: float | None = None  # until the sun's keep-out is where the antenna stands; None: not within an hour
