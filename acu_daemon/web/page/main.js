@@ -82,7 +82,7 @@ function draw(said) {
     showCountdowns(now, state.backdrop, state.ahead, 0);
     if (!state.schedule.length) showSchedule([], now);
   }
-  window.acuShown = window.acuSeen;
+  window.acuShown = { ...window.acuSeen, drawn: performance.now() };
 }
 function showHead(seen) {
   say("satellite", seen.satellite || "between passes");

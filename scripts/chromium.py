@@ -1,5 +1,7 @@
 """A real Chromium, led by its own protocol (Chrome DevTools): pages, true presses of pointer and keys, pictures."""
 
+# ruff: noqa: ASYNC110, ASYNC220, ASYNC240  (nothing else waits for this loop)
+
 import asyncio
 import base64
 import contextlib
