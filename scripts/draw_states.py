@@ -40,8 +40,10 @@ COLOURS = {
 }  # fmt: skip
 OTHER_COLOUR = "#555555"
 NAMES: tuple[tuple[str, Set[TrackState]], ...] = (
-    ("every state of a pass", ACTIVE),
-    ("every state of a pass but PREPOSITION", ACTIVE - {S.PREPOSITION}),
+    ("IDLE and every state of a pass", ACTIVE - {S.SLAVED} | {S.IDLE}),
+    ("every state of a pass", ACTIVE - {S.SLAVED}),
+    ("SLAVED and every state of a pass", ACTIVE),
+    ("every state of a pass but PREPOSITION", ACTIVE - {S.PREPOSITION, S.SLAVED}),
 )
 Point = tuple[float, float]
 

@@ -23,7 +23,7 @@ from acu_daemon.config.onboard_tables import (
     PassSection,
     TargetRow,
 )
-from acu_daemon.config.outlet_tables import MetricsSection
+from acu_daemon.config.outlet_tables import MetricsSection, RotctldSection
 from acu_daemon.config.recording_tables import RecordingSection
 from acu_daemon.config.satellite_tables import BrouwerSection, ElementsFileSection, LimitsSection
 from acu_daemon.config.schedule_tables import MaintenanceSection
@@ -95,6 +95,7 @@ OUT_OF_SAID: dict[str, tuple[type[Section], dict[str, Any]]] = {  # ranges that 
     **{f"HooksSection.{hook}": (HooksSection, {str(hook): "a text"}) for hook in Hook},
     "WindSection.udp": (WindSection, {"udp": "4841"}),
     "WebSection.listen": (WebSection, {"listen": "localhost:8642"}),
+    "RotctldSection.listen": (RotctldSection, {"listen": "localhost:4533"}),
     "MetricsSection.listen": (MetricsSection, {"listen": "localhost:9842"}),
     "WebSection.token_file": (WebSection, {"token_file": ""}),
     "WebSection.names": (WebSection, {"names": [""]}),

@@ -56,6 +56,8 @@ COMMANDS = {  # name: module of acu_daemon.cli, and the function in it
     "nudge": ("operator_commands", "nudge"),
     "skip": ("operator_commands", "skip"),
     "unskip": ("operator_commands", "unskip"),
+    "grant": ("lease_commands", "grant"),
+    "revoke": ("lease_commands", "revoke"),
     "reload": ("operator_commands", "reload"),
     "status": ("operator_commands", "status"),
     "wait": ("wait", "command"),

@@ -32,7 +32,7 @@ Named = Annotated[str, typer.Option("--satellite", metavar="NAME", help="Whose p
 Time = Annotated[str, typer.Option("--at", metavar="UTC", help="A time at which it is up.")]
 
 
-def _say(line: str, config: Path | None, state: Path | None, *, is_rehearsal: bool) -> None:
+def say(line: str, config: Path | None, state: Path | None, *, is_rehearsal: bool) -> None:
     word = line.split(" ")[0]
     answer = ask(find_daemon(word, config, state, is_rehearsal=is_rehearsal), line)
     typer.echo(with_choice(answer, choice_text(config, state, is_rehearsal=is_rehearsal)))
@@ -48,7 +48,7 @@ def arm(config: Config = None, state: State = None, rehearsal: Rehearsal = False
 
     Exit status: 0 armed; 1 no daemon, no permission, or it runs with --shadow.
     """
-    _say("arm", config, state, is_rehearsal=rehearsal)
+    say("arm", config, state, is_rehearsal=rehearsal)
 
 
 def disarm(config: Config = None, state: State = None, rehearsal: Rehearsal = False) -> None:
@@ -58,7 +58,7 @@ def disarm(config: Config = None, state: State = None, rehearsal: Rehearsal = Fa
 
     Exit status: 0 disarmed; 1 no daemon or no permission.
     """
-    _say("disarm", config, state, is_rehearsal=rehearsal)
+    say("disarm", config, state, is_rehearsal=rehearsal)
 
 
 def clear(config: Config = None, state: State = None, rehearsal: Rehearsal = False) -> None:
@@ -68,7 +68,7 @@ def clear(config: Config = None, state: State = None, rehearsal: Rehearsal = Fal
 
     Exit status: 0 cleared, or nothing was latched; 1 no daemon or no permission.
     """
-    _say("clear", config, state, is_rehearsal=rehearsal)
+    say("clear", config, state, is_rehearsal=rehearsal)
 
 
 def stop(config: Config = None, state: State = None, rehearsal: Rehearsal = False) -> None:
@@ -79,7 +79,7 @@ def stop(config: Config = None, state: State = None, rehearsal: Rehearsal = Fals
 
     Exit status: 0 sent; 1 no daemon, no permission, or it runs with --shadow.
     """
-    _say("stop", config, state, is_rehearsal=rehearsal)
+    say("stop", config, state, is_rehearsal=rehearsal)
 
 
 def stow(config: Config = None, state: State = None, rehearsal: Rehearsal = False) -> None:
@@ -91,7 +91,7 @@ def stow(config: Config = None, state: State = None, rehearsal: Rehearsal = Fals
 
     Exit status: 0 asked; 1 refused, no daemon or no permission.
     """
-    _say("stow", config, state, is_rehearsal=rehearsal)
+    say("stow", config, state, is_rehearsal=rehearsal)
 
 
 def unstow(config: Config = None, state: State = None, rehearsal: Rehearsal = False) -> None:
@@ -101,7 +101,7 @@ def unstow(config: Config = None, state: State = None, rehearsal: Rehearsal = Fa
 
     Exit status: 0; 1 refused, no daemon or no permission.
     """
-    _say("unstow", config, state, is_rehearsal=rehearsal)
+    say("unstow", config, state, is_rehearsal=rehearsal)
 
 
 def hold(config: Config = None, state: State = None, rehearsal: Rehearsal = False) -> None:
@@ -109,7 +109,7 @@ def hold(config: Config = None, state: State = None, rehearsal: Rehearsal = Fals
 
     Exit status: 0; 1 no pass is on, disarmed, no daemon or no permission.
     """
-    _say("hold", config, state, is_rehearsal=rehearsal)
+    say("hold", config, state, is_rehearsal=rehearsal)
 
 
 def track(config: Config = None, state: State = None, rehearsal: Rehearsal = False) -> None:
@@ -117,7 +117,7 @@ def track(config: Config = None, state: State = None, rehearsal: Rehearsal = Fal
 
     Exit status: 0; 1 no pass is on, disarmed, no daemon or no permission.
     """
-    _say("track", config, state, is_rehearsal=rehearsal)
+    say("track", config, state, is_rehearsal=rehearsal)
 
 
 def nudge(
@@ -145,7 +145,7 @@ def nudge(
     """
     given = {"along_s": along_s, "across_deg": across_deg, "keep": "yes" if keep else None}
     words = [f"{name}={value}" for name, value in given.items() if value is not None]
-    _say(" ".join(["nudge", *words]), config, state, is_rehearsal=rehearsal)
+    say(" ".join(["nudge", *words]), config, state, is_rehearsal=rehearsal)
 
 
 def skip(
@@ -158,7 +158,7 @@ def skip(
 
     Exit status: 0; 1 refused, no station or no permission.
     """
-    _say(_about_pass("skip", satellite, at), config, state, is_rehearsal=rehearsal)
+    say(_about_pass("skip", satellite, at), config, state, is_rehearsal=rehearsal)
 
 
 def unskip(
@@ -168,7 +168,7 @@ def unskip(
 
     Exit status: 0; 1 refused, no station or no permission.
     """
-    _say(_about_pass("unskip", satellite, at), config, state, is_rehearsal=rehearsal)
+    say(_about_pass("unskip", satellite, at), config, state, is_rehearsal=rehearsal)
 
 
 def _about_pass(verb: str, satellite: str | None, at: str | None) -> str:
@@ -184,7 +184,7 @@ def reload(config: Config = None, state: State = None, rehearsal: Rehearsal = Fa
 
     Exit status: 0 asked; 1 no daemon, no permission, or it tracks a single satellite.
     """
-    _say("reload", config, state, is_rehearsal=rehearsal)
+    say("reload", config, state, is_rehearsal=rehearsal)
 
 
 def status(

@@ -2,29 +2,38 @@
 
 import asyncio
 import contextlib
+import ipaddress
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from acu_daemon.config.station_tables import StationFile
-from acu_daemon.daemon.operator_verbs import VERBS
+from acu_daemon.control.lease import LASTS_S, Claim
+from acu_daemon.control.tick_input import SlaveWish
+from acu_daemon.daemon.operator_requests import tell
+from acu_daemon.daemon.operator_verbs import VERBS, understood
+from acu_daemon.daemon.service import Service
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.daemon.tally import Tally
 from acu_daemon.daemon.write_lease import WriteLease
 from acu_daemon.edge.clock import Clock
+from acu_daemon.errors import UsageError
 from acu_daemon.schedule.wind import WindWatch
 
 if TYPE_CHECKING:  # they take a third of a second to load, and most daemons have no use for them
+    from acu_daemon.cli.led_antenna import LedAntenna
     from acu_daemon.outlets.metric_families import Surroundings
     from acu_daemon.outlets.metrics_server import MetricsServer
+    from acu_daemon.outlets.rotctld_port import RotctldPort
 
+LEASE_VERBS = ("grant", "revoke")
 DISK_S = 30.0
 Answer = Callable[[str, str], str]
 
 
 class Outlets:
-    """Owned by the loop.  wind: what is known of it, of a station that watches it."""
+    """Owned by the loop.  current: the run that goes on; wind: what is known of it, of a station that watches it."""
 
     def __init__(
         self,
@@ -32,11 +41,16 @@ class Outlets:
         directory: Path,
         clock: Clock,
         lease: WriteLease | None = None,
+        current: Callable[[], Service | None] = lambda: None,
         wind: Callable[[], WindWatch] = WindWatch,
     ) -> None:
         self.tally = Tally()
         self.lease = WriteLease(clock.monotonic_s) if lease is None else lease
         self._station, self._directory, self._wind = station, directory, wind
+        self._clock, self._current = clock, current
+        self._answer: Answer = lambda _line, _who: "error the daemon starts"
+        self._antenna: LedAntenna | None = None
+        self._rotctld: RotctldPort | None = None
         self._metrics: MetricsServer | None = None
         self._disk_free_bytes: int | None = None
         self._tasks: list[asyncio.Task[None]] = []
@@ -49,22 +63,65 @@ class Outlets:
             self._metrics = MetricsServer(self.tally, self._around)
             await self._metrics.open(*address)
             self._tasks.append(asyncio.create_task(self._watch_disk(), name="disk"))
+        if (address := self._station.rotctld.address) is not None:
+            from acu_daemon.cli.led_antenna import DaemonSeen, LedAntenna
+            from acu_daemon.outlets.rotctld_port import RotctldPort
+
+            seen = DaemonSeen(self.tally, self._clock, self._current, lambda line, who: self._answer(line, who))
+            self._antenna = LedAntenna(self._station, seen)
+            self._rotctld = RotctldPort(self._antenna, self.lease, self._clock.monotonic_s)
+            await self._rotctld.open(*address)
 
     def see(self, _seen: Snapshot) -> None:
         """A tick is over, and this is to be seen; the tally has it already."""
+        if self._rotctld is not None and self._antenna is not None:
+            self._rotctld.look()
+            self._antenna.look()
         if self._metrics is not None:
             self._metrics.ticked()
+
+    @property
+    def wish(self) -> SlaveWish | None:
+        """What a program that has the lease wants of the antenna now; None: none leads it."""
+        return None if self._antenna is None else self._antenna.wish
 
     def counted(self, answer: Answer) -> Answer:
         """What answers people's lines, with those counted that were obeyed."""
 
         def counting(line: str, who: str = "") -> str:
-            reply, verb = answer(line, who), line.split(" ")[0]
+            verb = line.split(" ")[0]
+            reply = (
+                self._of_lease(line, who) if verb in LEASE_VERBS and self._rotctld is not None else answer(line, who)
+            )
             if verb in VERBS and reply.startswith("ok"):
                 self.tally.count("actions", f"{verb} {via_of(who)}")
             return reply
 
+        self._answer = counting
         return counting
+
+    def _of_lease(self, line: str, who: str) -> str:
+        """Give the lease to a program's address, or take it back from whoever has it."""
+        from acu_daemon.outlets.rotctld_port import key_of
+
+        try:
+            said = understood(line)
+            if said.verb.name == "revoke":
+                held = self.lease.held
+                if held is not None:
+                    self.lease.give_back(held.claim.key)
+                whose = "nobody's" if held is None else f"that of {held.claim.name} by {held.claim.via}"
+                return tell(line=line, who=who, answer=f"ok the lease was {whose}")
+            address = str(ipaddress.ip_address(said.texts.get("to", "")))
+        except (UsageError, ValueError) as error:
+            return f"error {error}"
+        lasts_s = said.figures.get("lasts_s", LASTS_S)
+        claim = Claim(key_of(address), address, "rotctl", said.texts.get("name", ""), lasts_s)
+        if refused := self.lease.take(claim, takes_over=said.texts.get("over") == "yes"):
+            return tell(line=line, who=who, answer=f"error {refused}")
+        return tell(
+            line=line, who=who, answer=f"ok {address} may lead the antenna, until it is silent for {lasts_s:g} s"
+        )
 
     def asked_for_elements(self, source: str, problem: str) -> None:
         """A server of elements was asked; problem: a word for why nothing good came, empty: it did."""
@@ -77,6 +134,8 @@ class Outlets:
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
+        if self._rotctld is not None:
+            await self._rotctld.close()
         if self._metrics is not None:
             await self._metrics.close()
 

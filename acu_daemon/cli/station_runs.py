@@ -23,6 +23,7 @@ from acu_daemon.cli.weather_watch import WeatherWatch
 from acu_daemon.control.safety.stow import end_between_passes
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick_input import Asking, NudgeWish, StowWish
+from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.daemon.health import Health
 from acu_daemon.daemon.live import LiveLine
 from acu_daemon.daemon.service import Outcome, PassJob, Service
@@ -40,6 +41,9 @@ from acu_daemon.model import Pass
 from acu_daemon.schedule.book import Entry
 from acu_daemon.schedule.decisions import RESUMED
 
+LED = "a program leads the antenna"
+LED_BEGINS_S = 30.0  # for the start of its run, modes included
+
 
 class StationRuns:
     """One run after another, each with the memory of the one before.  Owned by the loop."""
@@ -47,7 +51,9 @@ class StationRuns:
     def __init__(self, setup: StationSetup, first: Target, live: LiveLine | None) -> None:
         self._setup, self._first, self._live = setup, first, live
         lease = None if setup.page is None else setup.page.lease
-        self.outlets = Outlets(first.station, setup.directory, setup.clock, lease, lambda: self.day.wind.seen)
+        self.outlets = Outlets(
+            first.station, setup.directory, setup.clock, lease, lambda: self._service, lambda: self.day.wind.seen
+        )
         self.day = StationDay(
             setup.config,
             setup.clock,
@@ -74,6 +80,7 @@ class StationRuns:
         self._stop_reason = ""
         self._is_resting = False
         self._first_ask: Asking | None = None  # what the first tick of the next run is asked for
+        self._led_until_tai_s = math.inf
         self._is_placed = True  # where it waits after a pass
         self._move_until_tai_s = math.inf
         self._hand = StationHand(self.day, setup.clock.tai_s)
@@ -111,7 +118,9 @@ class StationRuns:
         outcome = outcome or await self._rest()
         while not self._stop_reason and outcome.reason != "duration over":
             entry = self.day.keeper.coming()
-            if outcome.reason.endswith(" begins") and entry is not None:
+            if outcome.reason == LED:
+                outcome = await self._led()
+            elif outcome.reason.endswith(" begins") and entry is not None:
                 outcome = await self._pass() or outcome
             elif not self._is_placed and isinstance(after := self.day.after(), tuple):
                 self._is_placed = True
@@ -133,7 +142,10 @@ class StationRuns:
                 self._setup.clock.obey()
                 self.day.keeper.anew_reason = f"the system clock was set by {step_s:+.1f} s"
                 return self.day.keeper.anew_reason
-            if why := self.day.look():
+            why = self.day.look()
+            if self.outlets.wish is not None:
+                return LED
+            if why:
                 entry = self.day.keeper.coming()
                 is_resumed = entry is not None and entry.reason.startswith(RESUMED)  # it moved a moment ago
                 return why if entry is None or is_resumed or self._is_warned(self.day.about(entry)) else ""
@@ -223,6 +235,23 @@ class StationRuns:
         self._move_until_tai_s = math.inf
         return outcome
 
+    async def _led(self) -> Outcome:
+        """Let a program that has the write lease lead the antenna; the schedule waits for it, and it is shown."""
+        self._log.warning("station.led", by=self.outlets.wish.by if self.outlets.wish else "")
+        self._first_ask, self._led_until_tai_s = self.outlets.wish, self._setup.clock.tai_s() + LED_BEGINS_S
+        outcome = await self._serve(replace(self._job(self._first, None), is_led=True, satellite=""), NoFits(), None)
+        self._led_until_tai_s = math.inf
+        self._is_placed = False
+        return outcome
+
+    def _look_at_led(self, seen: Snapshot) -> None:
+        """End the run once the program leads the antenna no more, or does not come to."""
+        if math.isinf(self._led_until_tai_s) or self._service is None:
+            return
+        self.day.look()
+        if self.outlets.wish is None or (seen.state != TrackState.SLAVED and seen.tai_s > self._led_until_tai_s):
+            self._service.stop("led no more")
+
     def _job(self, target: Target, coming: Pass | None, *, is_resting: bool = False) -> PassJob:
         setup = self._setup
         end_tai_s = setup.clock.tai_s() + setup.end_s - setup.clock.monotonic_s()
@@ -295,6 +324,7 @@ class StationRuns:
         self._snapshots.write(seen)
         self.page.see(seen)
         self.outlets.see(seen)
+        self._look_at_led(seen)
         self.day.see(seen)
         self._obey_wind(seen)
         if self._live is not None:

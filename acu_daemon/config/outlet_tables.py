@@ -1,4 +1,4 @@
-"""[metrics] of station.toml: what other programs are told, and where."""
+"""[metrics] and [rotctld] of station.toml: what other programs are told, and where."""
 
 import ipaddress
 
@@ -36,6 +36,28 @@ class MetricsSection(Section):
     def _is_address(cls, value: str | None) -> str | None:
         if value is not None:
             address_of(value, "127.0.0.1:9842")
+        return value
+
+    @property
+    def address(self) -> tuple[str, int] | None:
+        return None if self.listen is None else address_of(self.listen, "")
+
+
+class RotctldSection(Section):
+    listen: Name | None = Field(
+        default=None,
+        json_schema_extra={"range": "ADDRESS:PORT"},
+        description=(
+            "Where programs for rotators find the antenna, such as 127.0.0.1:4533, in Hamlib's protocol.  Decides "
+            "whether there is such a port; who may lead the antenna by it is a person's word (docs/rotctld.md)."
+        ),
+    )
+
+    @field_validator("listen")
+    @classmethod
+    def _is_address(cls, value: str | None) -> str | None:
+        if value is not None:
+            address_of(value, "127.0.0.1:4533")
         return value
 
     @property

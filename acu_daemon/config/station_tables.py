@@ -8,7 +8,7 @@ from acu_daemon.config.acu_tables import AcuSection
 from acu_daemon.config.antenna_tables import AtmosphereSection, MountSection, antenna_of
 from acu_daemon.config.elements_tables import ElementsSourcesSection
 from acu_daemon.config.envelope_tables import EnvelopeSection
-from acu_daemon.config.outlet_tables import MetricsSection
+from acu_daemon.config.outlet_tables import MetricsSection, RotctldSection
 from acu_daemon.config.recording_tables import RecordingSection
 from acu_daemon.config.schedule_tables import ScheduleSection
 from acu_daemon.config.section import Name, Section
@@ -193,6 +193,9 @@ class StationFile(Section):
 
     hooks: HooksSection = Field(
         default=HooksSection(), description="Programs that are started at what happens in a pass (docs/schedule.md)."
+    )
+    rotctld: RotctldSection = Field(
+        default=RotctldSection(), description="The port for programs that speak to rotators (docs/rotctld.md)."
     )
     metrics: MetricsSection = Field(default=MetricsSection(), description="What Prometheus reads (docs/metrics.md).")
     wind: WindSection = Field(default=WindSection(), description="When the wind stows the antenna (docs/schedule.md).")

@@ -17,7 +17,7 @@ from acu_daemon.control.safety.axis_watch import AxesWatch
 from acu_daemon.control.safety.encoder_watch import EncoderWatch
 from acu_daemon.control.safety.status_plausibility import Plausibility
 from acu_daemon.control.safety.turn import TurnWatch
-from acu_daemon.control.tick_input import StowBy
+from acu_daemon.control.tick_input import SlaveWish, StowBy
 from acu_daemon.control.tracking.lag import LagEstimate
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.model import Model, Reading
@@ -221,6 +221,15 @@ class ByHand:
 
 
 @dataclass(frozen=True, slots=True)
+class Slaved:
+    """Where another program leads the antenna.  Owner: control.tracking.slaving."""
+
+    wish: SlaveWish | None = None
+    until_tai_s: float = -inf
+    has_led: bool = False  # it has come to it: a link that is lost from then on ends it
+
+
+@dataclass(frozen=True, slots=True)
 class Scan:
     """How far SEARCH has come (control.tracking.scan): what each row covers, early to late, s; where it looks now."""
 
@@ -286,6 +295,7 @@ class ControlState:
     tracking: Tracking = Tracking()
     signal: Signal = Signal()
     by_hand: ByHand = ByHand()
+    slaved: Slaved = Slaved()
     search: Search = Search()
     false_lock: FalseLock = FalseLock()
     lag: Lag = Lag()

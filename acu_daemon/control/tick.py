@@ -36,6 +36,7 @@ from acu_daemon.control.tracking.false_lock import watch_lock
 from acu_daemon.control.tracking.learned_lag import learn_lag
 from acu_daemon.control.tracking.path_offset import drop_unusable_offset, forget_other_pass, learn_of_signal
 from acu_daemon.control.tracking.search import search
+from acu_daemon.control.tracking.slaving import take_slaving
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.control.tracking.walk import walk
 
@@ -57,6 +58,7 @@ def tick(state: ControlState, given: TickInput, config: ControlConfig) -> tuple[
     state = supervise(before, state, given.seen, config, events)
     state = watch_lock(state, given, config, events)
     state = steer_by_hand(state, given, config, events)
+    state = take_slaving(state, given, config, events)
     state = note_held(walk(forget_other_pass(state, given.sky), given, config, events), config)
     state = learn_of_signal(state, given, config, events)
     state = search(before, state, given, config, events)

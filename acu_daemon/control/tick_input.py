@@ -56,7 +56,20 @@ class NudgeWish:
     across_deg: float
 
 
-Asking = Request | StowWish | HoldWish | NudgeWish
+@dataclass(frozen=True, slots=True)
+class SlaveWish:
+    """Point the antenna as another program says: encoder angles, azimuth as a bearing; both None: let it stand.
+
+    lasts_s: how long that counts unless it says more; 0: it leads no more.  by: who, for people.
+    """
+
+    az_deg: float | None
+    el_deg: float | None
+    lasts_s: float
+    by: str = ""
+
+
+Asking = Request | StowWish | HoldWish | NudgeWish | SlaveWish
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,7 +28,7 @@ from acu_daemon.control.safety.arming import owes_stop
 from acu_daemon.control.safety.interlock import question
 from acu_daemon.control.safety.stow import stow_command
 from acu_daemon.control.state import StartStage, Watchdog
-from acu_daemon.control.tick_input import Arrival, Asking
+from acu_daemon.control.tick_input import Arrival, Asking, SlaveWish
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.clock_watch import ClockWatch
 from acu_daemon.daemon.decider import Decider
@@ -203,8 +203,13 @@ class Foreground:
             await self._do(orders.extra, "2")
 
     def ask(self, request: Asking) -> None:
-        """Take a person's request; the next tick obeys."""
-        self._requests = (*self._requests, request)
+        """Take a person's request, or a program's; the next tick obeys.  Of a program's only the newest counts."""
+        waiting = self._requests
+        if isinstance(request, SlaveWish):
+            waiting = tuple(one for one in waiting if not isinstance(one, SlaveWish))
+        elif request in waiting:
+            return
+        self._requests = (*waiting, request)
 
     def _silence_s(self) -> float:
         """On another connection, however soon it came, everything is read again before it is commanded."""

@@ -63,6 +63,8 @@ class Hands:
                 answer = self._hold(is_wanted=verb.name == "hold")
             case "nudge":
                 answer = self._nudge(said.figures)
+            case "grant" | "revoke":
+                answer = "error there is no rotctld port: [rotctld] listen of station.toml"
             case _:
                 answer = self._request(Request(verb.name))
         return tell(line=said.line, who=who, answer=answer)

@@ -63,6 +63,17 @@ VERBS: Mapping[str, OperatorVerb] = {
             is_of_station=True,
         ),
         OperatorVerb("unpause", "end a pause now", is_of_station=True),
+        OperatorVerb(
+            "grant",
+            "give the write lease to a program at the rotctld port, which then leads the antenna",
+            (
+                VerbParameter("to", "the program's IP address"),
+                VerbParameter("lasts_s", "so long after its last command", "s", 5.0, 3600.0),
+                VerbParameter("name", "what it is, for people"),
+                VerbParameter("over", "yes: take the lease over from who has it"),
+            ),
+        ),
+        OperatorVerb("revoke", "take the write lease back from whoever has it"),
         OperatorVerb("reload", "read files and elements again, between passes", is_of_station=True),
     )
 }

@@ -67,6 +67,7 @@ _STEERS = {
     S.ZENITH: "the daemon, past the zenith; then autotrack",
     S.FALSE_LOCK: "the daemon, back from a false lock onto the path; then autotrack",
     S.AVOID: "the daemon, clear of a keep-out; then autotrack",
+    S.SLAVED: "another program, by the write lease; then the daemon",
     S.MANUAL: "the local panel",
     S.STOW: "the ACU, to or in its stow position",
     S.FAULT: "nobody",

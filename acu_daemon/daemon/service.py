@@ -76,6 +76,7 @@ class PassJob:
     elements_epoch_tai_s: float | None = None
     next_passes: tuple[str, ...] = ()  # after this one, for people
     move: PassPlan | None = None  # only go there, before a pass or after it
+    is_led: bool = False  # only let another program lead the antenna
     is_anew: bool = False  # not the first run of this daemon: the ACU was there
     signal_udp: str | None = None  # ADDRESS:PORT at which a receiver beside the ACU tells of the signal
 
@@ -241,7 +242,7 @@ class Service:
         self._started_tai_s = self._clock.tai_s()
         async with asyncio.TaskGroup() as inner:
             tasks = [inner.create_task(self._foreground.run(), name="foreground")]
-            if not self._job.control.is_resting and self._job.move is None:
+            if not (self._job.control.is_resting or self._job.move is not None or self._job.is_led):
                 tasks.append(inner.create_task(self._background.run(), name="background"))
             await self._is_over.wait()
             for task in tasks:

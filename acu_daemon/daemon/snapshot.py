@@ -125,6 +125,8 @@ class Snapshot:
     envelope_alarm: str = ""  # an antenna that the daemon may not move, or does not, before a keep-out
     is_hidden: bool = False  # the path is behind the mask, and nothing is heard
     hidden_s: float | None = None  # until it comes out again, while it is
+    slaved_by: str = ""  # which program leads the antenna
+    slaved_s: float | None = None  # until it does no more, unless it says a direction before
     signal_db: float | None = None  # as a receiver beside the ACU said last
     signal_age_s: float | None = None  # since it said it
     signal_lost_s: float | None = None  # since it lost a lock of this pass

@@ -59,6 +59,8 @@ def take_snapshot(
         envelope_alarm=around.alarm,
         is_hidden=is_behind,
         hidden_s=None if until_tai_s is None else until_tai_s - now_tai_s,
+        slaved_by=state.slaved.wish.by if state.slaved.wish else "",
+        slaved_s=state.slaved.until_tai_s - now_tai_s if state.slaved.wish else None,
         **_receiver(state, now_tai_s, control),
         utc=utc_text(now_tai_s, 1),
         satellite=subject.satellite,

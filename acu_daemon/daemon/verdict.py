@@ -69,6 +69,8 @@ def verdict(seen: Snapshot) -> Verdict:
     if state is S.AVOID:
         why = seen.limit_alarm or "the path is clear again at once"
         return Verdict("AVOIDING", Level.WATCH, f"a keep-out is on the path, the antenna is led clear of it: {why}")
+    if state is S.SLAVED:
+        return Verdict("SLAVED", Level.WATCH, f"{seen.slaved_by or 'another program'} leads the antenna, by the lease")
     if state is S.PROGRAM:
         return _by_program(seen)
     return _blind(seen, state)

@@ -13,7 +13,7 @@ import numpy as np
 
 from acu_daemon.assist.session.refit import GateVerdict, RefitReply
 from acu_daemon.control.receiver_signal import SignalSample
-from acu_daemon.control.tick_input import Asking, HoldWish, NudgeWish, Request, StowBy, StowWish
+from acu_daemon.control.tick_input import Asking, HoldWish, NudgeWish, Request, SlaveWish, StowBy, StowWish
 from acu_daemon.edge.tape import Record
 from acu_daemon.errors import AcuDaemonError
 from acu_daemon.model import AngleBias, Correction, FitResult, Model
@@ -157,6 +157,8 @@ def _asking_json(asking: Asking) -> Any:
             return {"hold": is_wanted}
         case NudgeWish(along_s, across_deg):
             return {"nudge": [along_s, across_deg]}
+        case SlaveWish():
+            return {"slave": list(astuple(asking))}
         case _:
             return str(asking)
 
@@ -169,6 +171,8 @@ def _asking_of(read: Any) -> Asking:
             return HoldWish(is_wanted)
         case {"nudge": [along_s, across_deg]}:
             return NudgeWish(along_s, across_deg)
+        case {"slave": values}:
+            return SlaveWish(*values)
         case [by, is_wanted]:
             return StowWish(StowBy(by), is_wanted)
     raise ValueError(f"{read!r} is nothing that is asked for")

@@ -10,6 +10,7 @@ from acu_daemon.control.tick_input import Sky
 from acu_daemon.control.tracking.by_hand import steered_point
 from acu_daemon.control.tracking.causes import path_point
 from acu_daemon.control.tracking.scan import pointing
+from acu_daemon.control.tracking.slaving import slaved_point
 from acu_daemon.control.tracking.state_table import ACTIVE, AUTOTRACKING, HOLDING, TrackState
 from acu_daemon.model import Pointing
 from acu_daemon.pointing.wrap import nearest_turn
@@ -47,6 +48,8 @@ def _point(
     may_jump = not is_followed and state.tracking.track not in AUTOTRACKING and not _is_denied(state, config)
     if state.tracking.track not in ACTIVE or may_jump:
         return None  # a mode that follows the registers must find them where the antenna is, not where it shall go
+    if state.tracking.track is TrackState.SLAVED:
+        return slaved_point(state)
     if state.tracking.track is TrackState.SEARCH and sky.prediction is not None:
         return pointing(state.search.scan, sky.prediction, aim_tai_s, config) or path_point(sky, aim_tai_s)
     return steered_point(state, sky, aim_tai_s, follow=is_followed)

@@ -49,6 +49,7 @@ def find_causes(state: ControlState, given: TickInput, config: ControlConfig) ->
         causes |= _of_time(state, status, given, config)
         causes |= _of_zenith(state, given, config)
         causes |= _of_hand(state, given.sky, config)
+        causes.add(Cause.SLAVED if state.slaved.wish is not None else Cause.SLAVE_OVER)
         causes |= _of_false_lock(state, status, given, config)
         causes = _of_zones(causes, state, given, config)
     return causes

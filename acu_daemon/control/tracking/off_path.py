@@ -31,7 +31,7 @@ def off_path(state: ControlState, sky: Sky) -> OffPath | None:
     Before the rise the path stands still where the pass begins.
     """
     reading = state.intake.reading
-    if reading is None or state.tracking.track not in ACTIVE:
+    if reading is None or state.tracking.track not in ACTIVE - {TrackState.SLAVED}:
         return None
     made_from = MADE_FROM[sky.prediction.model] if sky.prediction is not None else MADE_FROM[Model.ELEMENTS]
     if state.tracking.track is TrackState.PREPOSITION:

@@ -24,6 +24,7 @@ class TrackState(StrEnum):
     ZENITH = "ZENITH"
     FALSE_LOCK = "FALSE-LOCK"
     AVOID = "AVOID"
+    SLAVED = "SLAVED"
     MANUAL = "MANUAL"
     STOW = "STOW"
     FAULT = "FAULT"
@@ -70,6 +71,8 @@ class Cause(StrEnum):
     ZENITH_NEAR = "the azimuth drive cannot follow over the zenith: the antenna is led past it"
     ZENITH_PAST = "the antenna is past the zenith"
     ZENITH_PAST_FITTED = "the antenna is past the zenith, on the path of this pass's fit"
+    SLAVED = "a program that has the write lease leads the antenna"
+    SLAVE_OVER = "the program leads the antenna no more"
     SEARCH_OVER = "no signal within search_s"
     SEARCH_OVER_FITTED = "no signal within search_s around this pass's fit"
 
@@ -77,14 +80,14 @@ class Cause(StrEnum):
 S = TrackState
 ACTIVE = frozenset(
     {
-        *(S.PREPOSITION, S.PROGRAM, S.FALSE_LOCK),
+        *(S.PREPOSITION, S.PROGRAM, S.FALSE_LOCK, S.SLAVED),
         *(S.ACQUIRE_TLE, S.AUTOTRACK_TLE, S.AUTOTRACK_FITTED, S.HOLD_FITTED, S.HOLD_TLE, S.SEARCH, S.ZENITH, S.AVOID),
     }
 )
-TRACKING = ACTIVE - {S.PREPOSITION, S.AVOID}
+TRACKING = ACTIVE - {S.PREPOSITION, S.AVOID, S.SLAVED}
 HOLDING = frozenset({S.HOLD_FITTED, S.HOLD_TLE})
 AUTOTRACKING = frozenset({S.AUTOTRACK_TLE, S.AUTOTRACK_FITTED})
-LED = frozenset({S.PREPOSITION, S.PROGRAM, S.ZENITH, S.FALSE_LOCK, S.AVOID})  # autotrack is not selected
+LED = frozenset({S.PREPOSITION, S.PROGRAM, S.ZENITH, S.FALSE_LOCK, S.AVOID, S.SLAVED})  # autotrack is not selected
 ANY = frozenset(TrackState)
 NO_LINK = frozenset({S.LINK_LOST})
 
@@ -109,8 +112,10 @@ TABLE: tuple[Row, ...] = (
     Row(frozenset({S.FAULT}), Cause.FAULT_GONE, S.IDLE),
     Row(ANY - NO_LINK - {S.MANUAL, S.FAULT, S.STOW}, Cause.STOWING, S.STOW),
     Row(frozenset({S.STOW}), Cause.STOW_LEFT, S.IDLE),
-    Row(ACTIVE, Cause.PASS_OVER, S.IDLE, "set of the pass"),
+    Row(ACTIVE - {S.SLAVED}, Cause.PASS_OVER, S.IDLE, "set of the pass"),
     Row(ACTIVE, Cause.HANDS_OFF, S.IDLE),
+    Row(ACTIVE - {S.SLAVED} | {S.IDLE}, Cause.SLAVED, S.SLAVED, "its first direction"),
+    Row(frozenset({S.SLAVED}), Cause.SLAVE_OVER, S.IDLE, "the end of the lease"),
     Row(TRACKING, Cause.KEEP_OUT, S.AVOID, "4 s before the keep-out"),
     Row(frozenset({S.AVOID}), Cause.KEEP_OUT_PAST, S.IDLE),
     Row(TRACKING - {S.PROGRAM, S.ZENITH}, Cause.HELD, S.PROGRAM),
