@@ -26,6 +26,8 @@ PATIENCE_S = 60.0
 class StandIn:
     """A daemon that only notes what it is asked."""
 
+    is_station = True
+
     def __init__(self) -> None:
         self.asked: list[tuple[str, str]] = []
 

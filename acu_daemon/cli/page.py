@@ -115,9 +115,11 @@ class WatchedRuns:
         self,
         current: Callable[[], Service | None],
         answer: Callable[[str, str], str],
-        passes: Callable[[], list[dict[str, Any]]] = list,
+        passes: Callable[[], list[dict[str, Any]]] | None = None,
     ) -> None:
+        """passes: of a station's schedule; None: it is none."""
         self._current, self._answer, self._passes = current, answer, passes
+        self.is_station = passes is not None
 
     def answer(self, line: str, who: str = "") -> str:
         """Do what a line says."""
@@ -140,7 +142,7 @@ class WatchedRuns:
         return np.zeros(0) if service is None else service.lateness_ms(most)
 
     def passes(self) -> list[dict[str, Any]]:
-        return self._passes()
+        return [] if self._passes is None else self._passes()
 
 
 def passes_shown(
@@ -154,6 +156,7 @@ def passes_shown(
             "satellite": one.satellite,
             "rise_utc": utc_text(one.rise_tai_s, 0),
             "set_utc": utc_text(one.set_tai_s, 0),
+            "at_utc": utc_text(one.culmination_tai_s, 0),
             "culmination_deg": round(one.culmination_el_deg, 1),
             "priority": one.priority,
             "state": str(one.state),

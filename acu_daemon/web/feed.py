@@ -20,6 +20,7 @@ from acu_daemon.daemon.write_lease import WriteLease
 from acu_daemon.units import Array
 from acu_daemon.web import alarm_book
 from acu_daemon.web.alarm_book import AlarmBook
+from acu_daemon.web.order_desk import verbs_shown
 from acu_daemon.web.pass_story import PassStory
 from acu_daemon.web.recent_events import RecentEvents
 
@@ -49,6 +50,8 @@ class Topic(StrEnum):
 
 class Watched(Protocol):
     """The daemon, as the page sees it; None: it has nothing to show yet."""
+
+    is_station: bool
 
     def answer(self, line: str, who: str = "") -> str: ...
 
@@ -90,7 +93,7 @@ class Feed:
     def see(self, seen: Snapshot) -> None:
         """Take the newest snapshot."""
         self._story.see(seen)
-        self._book = alarm_book.seen(self._book, alarms(seen), seen.utc)
+        self._book = alarm_book.seen(self._book, alarms_shown(seen), seen.utc)
         if self.is_watched:
             self._put(Topic.NOW, self._now(seen))
             self.refresh()
@@ -119,6 +122,10 @@ class Feed:
         """Somebody has seen an alarm."""
         self._book = alarm_book.acknowledged(self._book, number, by)
         self.refresh()
+
+    def verbs(self) -> list[dict[str, Any]]:
+        """What may be ordered here."""
+        return verbs_shown(is_station=self._watched.is_station)
 
     def strip(self) -> str:
         """The last minutes, for a page that has just been opened."""
@@ -168,6 +175,11 @@ class Feed:
         if old is None or old.json != text:
             self._version += 1
             self._texts[topic] = _Text(self._version, text)
+
+
+def alarms_shown(seen: Snapshot) -> list[str]:
+    """The alarms; who has disarmed it is no sentence by itself."""
+    return [f"disarmed by {text}" if text == seen.disarmed_by else text for text in alarms(seen)]
 
 
 def to_json(value: Any) -> str:

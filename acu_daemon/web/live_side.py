@@ -10,7 +10,7 @@ from aiohttp import web
 
 from acu_daemon.web.feed import Feed, Topic, to_json
 from acu_daemon.web.guard import Allowance
-from acu_daemon.web.order_desk import Person, verbs_shown
+from acu_daemon.web.order_desk import Person
 
 AHEAD = 2  # texts that the page has not acknowledged
 BEAT_S = 0.4  # at least so often something is sent: a page that hears nothing for a second says so
@@ -82,7 +82,7 @@ class LiveSide:
     def _hello(self) -> str:
         self._open_count += 1
         seals = self.person.seals
-        hello = {"nonce": seals.nonce, "may_order": seals.token is not None, "verbs": verbs_shown()}
+        hello = {"nonce": seals.nonce, "may_order": seals.token is not None, "verbs": self._feed.verbs()}
         return f'{{"hello":{to_json(hello)},"strip":{self._feed.strip()}}}'
 
     def _newest(self) -> str:

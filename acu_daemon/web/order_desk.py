@@ -125,9 +125,11 @@ class OrderDesk:
             self._log.warning("page.refused", who=person.who, reason=why)
 
 
-def verbs_shown() -> list[dict[str, Any]]:
-    """What may be ordered, for the page's buttons."""
-    return [asdict(verb) for verb in VERBS.values()]
+def verbs_shown(*, is_station: bool) -> list[dict[str, Any]]:
+    """What may be ordered, for the page's buttons; STOP has one of its own."""
+    return [
+        asdict(verb) for verb in VERBS.values() if verb.name != STOP_LINE and (is_station or not verb.is_of_station)
+    ]
 
 
 def line_of(said: dict[str, Any]) -> str | None:

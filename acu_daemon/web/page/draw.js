@@ -104,7 +104,7 @@ function drawBeam(now, back, ahead, isOld) {
     return;
   }
   const search = ahead?.searched ?? [];
-  const far = Math.max(0.7, ...[aim.beside_deg, ...search.flat()].map((p) => (p ? Math.hypot(...p) / beam + 0.3 : 0)));
+  const far = Math.max(0.9, ...[aim.beside_deg, ...search.flat()].map((p) => (p ? Math.hypot(...p) / beam + 0.5 : 0)));
   const span = SPANS.find((one) => one >= far) ?? 200, scale = 100 / (span * beam);
   const at = ([right, up]) => [right * scale, -up * scale];
   all.replaceChildren();
@@ -121,7 +121,7 @@ function drawBeam(now, back, ahead, isOld) {
   const place = aim.beside_deg ? at(aim.beside_deg) : null;
   if (place) shape(all, "circle", { r: (beam / 2) * scale, class: "lobe", transform: `translate(${put(place)})` });
   if (aim.path_deg) marker(all, "satellite", [0, 0]);
-  if (aim.command_beside_deg && Math.hypot(...aim.command_beside_deg) * scale < 100) marker(all, "commanded", at(aim.command_beside_deg));
+  if (aim.command_beside_deg && aim.written_age_s < OLD_S && Math.hypot(...aim.command_beside_deg) * scale < 100) marker(all, "commanded", at(aim.command_beside_deg));
   if (place) marker(all, "measured", place).classList.toggle("old", isOld);
   byId("beam-scale").textContent = `rim ${span} beamwidth${span === 1 ? "" : "s"}, ${(span * beam).toPrecision(2)} deg; shaded: half power; dashed: 3 sigma`;
 }

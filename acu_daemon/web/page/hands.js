@@ -51,7 +51,7 @@ function watchStop(now) {
     text += ` \u2014 the ACU confirms ${now.stop_confirmed_utc.slice(11, 23)}`;
     const stands = now.speed_deg_s !== null && now.speed_deg_s < 0.2;
     if (stands) stopped.stood ||= performance.now();
-    text += stands ? ` \u2014 the antenna stands${after(stopped.stood - stopped.at)}. It stays disarmed until somebody arms it.` : " \u2014 it still moves";
+    text += stands ? ` \u2014 the antenna stands${after(stopped.stood - stopped.at)}; disarmed until somebody arms it` : " \u2014 it still moves";
   } else text += now.is_stopping || isNew ? " \u2014 the ACU has not confirmed yet" : "";
   sayStop(text);
 }
@@ -103,31 +103,33 @@ function showLock() {
 function makeVerbs(verbs) {
   const box = byId("verbs");
   box.replaceChildren();
+  const plain = (text) => text.replaceAll("`", "");
   for (const verb of verbs) {
-    const set = element("fieldset"), legend = element("legend", verb.what), fields = [];
-    set.append(legend);
+    const row = element("div", undefined, verb.parameters.length ? "verb wide" : "verb"), fields = [], button = element("button", verb.name), what = element("p", plain(verb.what), "dim");
+    button.type = "button";
+    what.id = `what-${verb.name}`;
+    button.setAttribute("aria-describedby", what.id);
+    row.append(button, what);
     for (const one of verb.parameters) {
-      const label = element("label", one.unit ? `${one.what}, ${one.unit}` : one.what), input = element("input");
+      const isChoice = one.what.startsWith("yes:"), input = element("input");
+      const label = element("label", `${one.name.replace(/_(s|deg)$/, "")}${one.unit ? `, ${one.unit}` : ""}: ${plain(one.what).replace(/^yes: /, "")}`);
+      if (isChoice) Object.assign(input, { type: "checkbox", value: "yes" });
       input.name = one.name;
-      if (one.unit) {
-        Object.assign(input, { type: "number", step: "any", min: one.least, max: one.most });
-      }
+      if (one.unit) Object.assign(input, { type: "number", step: "any", min: one.least, max: one.most });
+      if (/UTC/.test(one.what)) input.placeholder = `${new Date().toISOString().slice(0, 16)}:00Z`;
       fields.push(input);
       label.append(input);
-      set.append(label);
+      row.append(label);
     }
-    const button = element("button", verb.name);
-    button.type = "button";
     button.addEventListener("click", () => {
       const values = {};
       for (const one of fields) {
         if (!one.reportValidity()) return;
-        if (one.value !== "") values[one.name] = one.type === "number" ? Number(one.value) : one.value;
+        if (one.type === "checkbox" ? one.checked : one.value !== "") values[one.name] = one.type === "number" ? Number(one.value) : one.value;
       }
       order({ do: "verb", verb: verb.name, values });
     });
-    set.append(button);
-    box.append(set);
+    box.append(row);
   }
   const lock = element("button", "lock, and give the lease back");
   lock.type = "button";

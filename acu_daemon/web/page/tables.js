@@ -45,8 +45,9 @@ function showVerdict(now) {
   const error = now.off_path_deg !== null && now.half_beam_deg ? now.off_path_deg / (2 * now.half_beam_deg) : null;
   const off = error !== null && now.state !== "PREPOSITION" ? `, ${error.toFixed(error < 10 ? 2 : 0)} beamwidths off the path` : "";
   const good = now.inside_s !== null && !STANDS.has(now.state) ? `; good for ${now.inside_s >= now.buffer_s - 0.3 ? ">" : ""}${now.inside_s.toFixed(0)} s without a signal` : "";
-  say("why", `${now.why}${off}${good}`);
-  const [steers, next] = STEERING[now.state] ?? ["-", "-"];
+  say("why", `${now.why.replaceAll("`", "")}${off}${good}`);
+  const isOff = now.state === "IDLE" && now.arming === "disarmed";
+  const [steers, next] = isOff ? ["nobody", "the daemon, when somebody arms it"] : STEERING[now.state] ?? ["-", "-"];
   say("steers", steers);
   say("next-steers", next);
   say("may-move", mayMove(now));
@@ -78,7 +79,9 @@ function showFigures(now, back, silent) {
   say("age-m", now.reading_age_s === null ? "never" : `${(now.reading_age_s + silent).toFixed(1)} s`);
   say("age-c", aim?.written_age_s === null || !aim ? "-" : `${(aim.written_age_s + silent).toFixed(1)} s`);
   say("age-s", now.fit_age_s !== null ? `fit ${(now.fit_age_s + silent).toFixed(0)} s` : now.model || "-");
+  const isUnwritten = !aim || aim.written_age_s === null || aim.written_age_s + silent > OLD_S;
   for (const id of ["az-m", "el-m", "age-m"]) byId(id).classList.toggle("old-value", old);
+  for (const id of ["az-c", "el-c", "age-c"]) byId(id).classList.toggle("old-value", isUnwritten);
   const stops = back && aim && aim.az_turn_deg !== null ? `${(aim.az_turn_deg - back.azimuth_deg[0]).toFixed(0)} / ${(back.azimuth_deg[1] - aim.az_turn_deg).toFixed(0)} deg to the stops` : "";
   facts([
     ["cable", aim && aim.az_turn_deg !== null ? `${aim.az_turn_deg.toFixed(1)} deg, ${stops}` : "-", old],
@@ -86,6 +89,8 @@ function showFigures(now, back, silent) {
     ["signal", signalText(now, back), old],
     ["prediction", predictionText(now)],
     ["correction", now.along_s === null ? "no fit yet" : `${Math.abs(now.along_s).toFixed(2)} s ${now.along_s < 0 ? "early" : "late"}, ${signed(now.across_deg, 3)} deg across`],
+    ["nudge", nudgeText(now)], ["held", now.is_held_by_person ? "by a person: autotrack is left for the prediction, until track or the end of the pass" : ""],
+    ["wind", now.wind], ["paused", now.paused_until_utc ? `no pass begins before ${now.paused_until_utc}` : ""], ["rehearsed", now.phantom],
     ["sun", now.sun_deg === null ? "" : `${now.sun_deg.toFixed(1)} deg from the beam`],
     ["crossing", now.zenith.replace(/\d{4}-\d\d-\d\dT(\d\d:\d\d:\d\d)Z/g, "$1")], ["search", now.search], ["not fitted", now.rejecting], ["elements", now.elements + (now.elements_problem ? `; ${now.elements_problem}` : "")],
     ["ACU", `${now.acu_mode || "-"}, ${now.arming}${now.disarmed_by ? ` by ${now.disarmed_by}` : ""}`],
@@ -96,6 +101,10 @@ function signalText(now, back) {
   if (!now.is_link_up) return "not known";
   if (back && !back.has_signal) return "none is waited for";
   return `${now.is_acquired ? "acquired" : "not acquired"}${now.agc_db !== null ? `, ${now.agc_db.toFixed(1)} dB` : ""}`;
+}
+function nudgeText(now) {
+  if (!now.nudge_along_s && !now.nudge_across_deg) return "";
+  return `${signed(now.nudge_along_s, 2)} s late, ${signed(now.nudge_across_deg, 3)} deg across, by a person; until the pass ends or the next fit`;
 }
 function predictionText(now) {
   if (!now.buffer_kind) return "none yet";
@@ -184,7 +193,16 @@ function showSchedule(rows, now) {
     const line = element("tr");
     const go = one.no_go ? `NO-GO: ${one.no_go}` : one.no_go === "" ? "go" : "";
     for (const text of [one.satellite, one.rise_utc.slice(5, 19).replace("T", " "), one.set_utc.slice(11, 19), `${one.culmination_deg} deg`, one.state, [one.reason, go].filter(Boolean).join("; ")]) line.append(element("td", text));
-    if (one.no_go) line.lastChild.className = "bad-text";
+    line.lastChild.className = one.no_go ? "reason bad-text" : "reason";
+    const verb = one.state === "planned" ? "skip" : one.reason.startsWith("excluded") ? "unskip" : "";
+    if (verb && mayOrder) {
+      const button = element("button", verb, "small"), cell = element("td");
+      button.type = "button";
+      button.setAttribute("aria-label", `${verb} ${one.satellite} of ${one.rise_utc.slice(11, 16)}`);
+      button.addEventListener("click", () => order({ do: "verb", verb, values: { satellite: one.satellite, at: one.at_utc } }));
+      cell.append(button);
+      line.append(cell);
+    }
     body.append(line);
   }
   if (!rows.length) {
