@@ -5,7 +5,7 @@ Angles are degrees.  Azimuth is clockwise from true north.  "Encoder frame" mean
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from math import asin, cos, degrees, radians, sin, sqrt
 from typing import Literal, Protocol
@@ -46,6 +46,10 @@ class Antenna(Protocol):
     ) -> tuple[Array, Array]: ...
 
     def with_rates(
+        self, az_deg: Array, el_deg: Array, range_m: Array, az_rate_deg_s: Array, el_rate_deg_s: Array
+    ) -> tuple[Array, Array, Array, Array]: ...
+
+    def with_rates_plunged(
         self, az_deg: Array, el_deg: Array, range_m: Array, az_rate_deg_s: Array, el_rate_deg_s: Array
     ) -> tuple[Array, Array, Array, Array]: ...
 
@@ -109,6 +113,7 @@ class Readings:
     az_deg: Array
     el_deg: Array
     agc_db: Array | None = None  # NaN where one is unknown; None: all are
+    was_plunged: npt.NDArray[np.bool_] | None = None  # where the angles are the sky's: taken beyond the zenith
 
     def __len__(self) -> int:
         return int(self.tai_s.size)
@@ -116,7 +121,8 @@ class Readings:
     def part(self, which: slice | npt.NDArray[np.bool_] | npt.NDArray[np.int64]) -> "Readings":
         """The readings that an index of arrays picks."""
         agc_db = None if self.agc_db is None else self.agc_db[which]
-        return Readings(self.tai_s[which], self.az_deg[which], self.el_deg[which], agc_db)
+        was_plunged = None if self.was_plunged is None else self.was_plunged[which]
+        return Readings(self.tai_s[which], self.az_deg[which], self.el_deg[which], agc_db, was_plunged)
 
     def tail(self, newest_s: float) -> "Readings":
         """The newest ones, over so many seconds."""
@@ -206,6 +212,16 @@ class FitResult:
     covariance: Array | None = field(default=None, compare=False, repr=False)  # (17, 17), see full.estimated_states
 
 
+def plunged_bias(bias: AngleBias) -> AngleBias:
+    """The biases of a plunged antenna, as those of one that is not.
+
+    What turns with the elevation axis over the zenith shows the other way round: zero point of the elevation,
+    collimation, and the elevation axis that is not level.  What belongs to ground and air stays.
+    """
+    return replace(bias, el_deg=-bias.el_deg, az_sec_deg=-bias.az_sec_deg, npae_deg=-bias.npae_deg)
+
+
+HALF_TURN_DEG = 90.0  # from one sample to the next the azimuth turns by less than this, but where it is plunged
 MOST_DEG = 1e5  # more is no azimuth, however often the path goes round, and no rate
 PredictionKind = Literal["FITTED", "TLE"]
 
@@ -259,6 +275,7 @@ class ZenithCrossing:
     largest_error_deg: float
     lost_s: float
     lost_from_tai_s: float | None
+    is_plunge: bool = False  # over the top, the elevation beyond 90 deg from then on (pointing.plunge)
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,7 +284,8 @@ class Prediction:
 
     The arrays are (N,).  `follow_az_deg` and `follow_el_deg` are the path for an antenna that follows the registers:
     the path itself, for the elevation None, but where the azimuth drive is too slow (near the zenith), there one that
-    it can follow (pointing.keyhole); `crossing` says how.
+    it can follow (pointing.keyhole); `crossing` says how.  Over the top the path itself is the plunged antenna's from
+    culmination on, the azimuth half a turn further.
     """
 
     start_tai_s: float
@@ -318,6 +336,8 @@ class Prediction:
         if not -1e-6 <= x <= self.az_deg.size - 1 + 1e-6:
             return None
         i = min(max(int(x), 0), self.az_deg.size - 2)
+        if not follow and abs(float(self.az_deg[i + 1]) - float(self.az_deg[i])) > HALF_TURN_DEG and self._is_over:
+            return self._beside_top(i if x - i < 0.5 else i + 1, x)
         az = self.follow_az_deg if follow else self.az_deg
         az_rate = self.follow_az_rate_deg_s if follow else self.az_rate_deg_s
         az_deg, az_rate_deg_s = _hermite(az, az_rate, i, x - i, self.step_s)
@@ -326,6 +346,17 @@ class Prediction:
             el, el_rate = self.follow_el_deg, self.follow_el_rate_deg_s
         el_deg, el_rate_deg_s = _hermite(el, el_rate, i, x - i, self.step_s)
         return Pointing(az_deg, el_deg, az_rate_deg_s, el_rate_deg_s)
+
+    @property
+    def _is_over(self) -> bool:
+        return self.crossing is not None and self.crossing.is_plunge
+
+    def _beside_top(self, i: int, x: float) -> Pointing:
+        """Over the top the path is the plunged antenna's from one sample on: between them nothing is interpolated."""
+        since_s = (x - i) * self.step_s
+        az_rate, el_rate = float(self.az_rate_deg_s[i]), float(self.el_rate_deg_s[i])
+        az, el = float(self.az_deg[i]), float(self.el_deg[i])
+        return Pointing(az + since_s * az_rate, el + since_s * el_rate, az_rate, el_rate)
 
 
 def _hermite(y: Array, rate: Array, i: int, u: float, h: float) -> tuple[float, float]:

@@ -26,6 +26,7 @@ from acu_daemon.assist.session.refit import RefitReply, RefitRequest, RefitSetup
 from acu_daemon.cli.kept import open_kept
 from acu_daemon.cli.options import Target, coming_pass
 from acu_daemon.cli.run_setup import make_job
+from acu_daemon.control.tracking.pass_plan import PlanAnswer, PlanRequest
 from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.drivers.sa3842.codec import CommandDecoder, address_byte
@@ -164,6 +165,12 @@ class RigFitRunner:
             if self._given:
                 request = replace(request, readings=Readings.joined(self._given))
         return await self._inner.refit(request)
+
+    async def plan(self, asked: PlanRequest) -> PlanAnswer:
+        if self._rig.fit_trouble:
+            self._inner = None
+            raise FitDiedError(f"the fit process {self._rig.fit_trouble}")
+        return await InlineFitRunner(self._setup).plan(asked)
 
     async def close(self) -> None:
         """Nothing runs."""

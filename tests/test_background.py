@@ -20,12 +20,15 @@ from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.tick_input import PassPlan, Sky
 from acu_daemon.control.tracking.approach import lead_s
+from acu_daemon.control.tracking.pass_plan import PlanAnswer, PlanRequest
 from acu_daemon.control.tracking.state_table import TrackState
+from acu_daemon.daemon import background as planner
 from acu_daemon.daemon import buffer_keeper as module
 from acu_daemon.daemon.area import CommonArea
-from acu_daemon.daemon.background import Background
+from acu_daemon.daemon.background import PLAN_WAIT_S, Background
 from acu_daemon.daemon.buffer_keeper import BESIDE, PAST_S
-from acu_daemon.model import AxisLimits, Correction, FitResult, Model, Prediction, Reading
+from acu_daemon.edge.fit import FitFailedError
+from acu_daemon.model import AxisLimits, Correction, FitResult, Model, Pass, Prediction, Reading
 from acu_daemon.pointing.envelope import Envelope
 from acu_daemon.pointing.keyhole import longest_window_s
 
@@ -331,6 +334,47 @@ def test_a_new_plan_is_predicted_for_and_asked_about_at_once_where_its_pass_is_n
         assert room.area.sky.plan == PLAN
         assert bool(made.made) is is_near
         assert room.background._due.is_set() is is_near
+
+
+@pytest.mark.parametrize("before_s", [100.0, 2000.0])
+@pytest.mark.parametrize("answer", ["comes", "fails", "does not come"])
+async def test_a_plan_is_made_by_the_fit_process_and_where_that_does_not_answer_before_it_is_needed(
+    answer: str, before_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    theirs, ours = PlanAnswer(replace(PLAN, note="theirs")), PlanAnswer(replace(PLAN, note="ours"))
+    monkeypatch.setattr(planner, "planned_pass", lambda *_: ours)
+    Predictions(monkeypatch)
+    room = Room(TrackState.IDLE, Sky(None, None, None))
+    room.now = RISE - before_s
+    told, never = [], asyncio.Event()
+    room.background._on_plan = told.append
+
+    async def plan(_: PlanRequest) -> PlanAnswer:
+        if answer == "fails":
+            raise FitFailedError("it failed")
+        if answer == "does not come":
+            await never.wait()
+        return theirs
+
+    room.background._runner.plan = plan  # type: ignore[method-assign]
+    coming = Pass(RISE, RISE + 100.0, RISE + 200.0, 0.0, 50.0, 90.0, 180.0)
+    asked = PlanRequest(coming, 0.0, 45.0, CONFIG_HERE.envelope, room.now, 0, SETUP.keyhole)
+    room.background.ask_plan(asked)
+    room.background.ask_plan(replace(asked, now_tai_s=room.now + 0.1))  # it is asked for at every tick
+    task = asyncio.create_task(room.background.run())
+    await asyncio.sleep(0)
+    await asyncio.sleep(0)
+    has_waited = answer == "does not come"
+    assert bool(told) is not has_waited
+    room.is_due(PLAN_WAIT_S - 0.1)
+    assert bool(told) is not has_waited
+    room.is_due(0.2)
+    expected = [] if has_waited and before_s > 1000.0 else [theirs if answer == "comes" else ours]
+    assert told == expected
+    assert room.area.sky.plan == (expected[0].plan if expected else None)
+    never.set()
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
 
 
 def test_without_the_fit_process_the_next_buffer_is_made_from_what_the_last_one_was() -> None:

@@ -121,6 +121,7 @@ STATION_MISTAKES = [
     (LATITUDE, f"{LATITUDE}\nname = 5", "station.name = 5: expected text in quotes"),
     (AZIMUTH_MIN, "min_deg = 300.0", "acu.azimuth.min_deg = 300: expected less than max_deg = 270"),
     (AZIMUTH_MIN, "min_deg = -9999.0", "acu.azimuth.min_deg = -9999.0: expected at least -720"),
+    ("max_deg = 90.0", "max_deg = 180.0", 'acu.elevation.max_deg = 180: dialect = "sa3842": its angles end before 180'),
     ("max_deg = 90.0", "max_deg = 270.0", "acu.elevation.max_deg = 270.0: expected at most 180"),
     ("max_rate_deg_s = 5.0", "max_rate_deg_s = 0", "acu.elevation.max_rate_deg_s = 0: expected more than 0"),
     ("[acu]", "[acu]\nperiod_s = 0.01", "acu.period_s = 0.01: expected at least 0.1"),

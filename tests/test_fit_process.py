@@ -15,17 +15,20 @@ import pytest
 
 from acu_daemon.assist.estimators.estimator import ESTIMATORS, EstimatorSettings
 from acu_daemon.assist.session.refit import RefitReply, RefitRequest, RefitSetup
+from acu_daemon.control.tracking.pass_plan import PlanRequest
 from acu_daemon.edge.fit import FitFailedError, InlineFitRunner, ProcessFitRunner
 from acu_daemon.edge.fit_child import LENGTH
 from acu_daemon.model import AxisLimits, Correction, Readings
 from acu_daemon.orbit.look import look_at
+from acu_daemon.orbit.passes import find_passes
+from acu_daemon.pointing.envelope import Envelope
 
 pytestmark = pytest.mark.realtime
 
 ORBIT = made_orbits.circular()
 SITE = made_orbits.site()
 TRUTH = ORBIT.corrected(Correction(delta_mean_anomaly_rad=0.002))
-AZIMUTH = AxisLimits(-270.0, 270.0, 20.0, 10.0)
+AZIMUTH, ELEVATION = AxisLimits(-270.0, 270.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0)
 START = float(made_orbits.visible(ORBIT, SITE)[0])
 PATIENT_S = 120.0  # no time limit of a test depends on the machine
 
@@ -76,6 +79,20 @@ async def test_the_child_answers_as_inline_bit_for_bit(estimator: str) -> None:
     assert replies[-1].fit is not None
     assert replies[-1].prediction.kind == "FITTED"
     assert runner.start_count == 1
+
+
+async def test_the_child_plans_a_pass_as_inline_and_takes_no_harm_from_one_that_it_cannot_plan() -> None:
+    coming = next(iter(find_passes(ORBIT, SITE, START - 600.0, START + 3600.0, 5.0)))
+    asked = PlanRequest(coming, 10.0, 45.0, Envelope(AZIMUTH, ELEVATION), START - 500.0, 0, setup().keyhole)
+    runner = ProcessFitRunner(setup(), PATIENT_S)
+    planned = await runner.plan(asked)
+    backwards = replace(asked, coming=replace(coming, set_tai_s=float("nan")))
+    with pytest.raises(FitFailedError):
+        await runner.plan(backwards)
+    assert planned == await InlineFitRunner(setup()).plan(asked) == await runner.plan(asked)
+    await runner.close()
+    assert runner.start_count == 1
+    assert planned.plan.rise_tai_s == coming.rise_tai_s
 
 
 async def test_a_killed_child_is_replaced_and_given_all_readings_again() -> None:

@@ -190,7 +190,7 @@ def test_another_prediction_is_searched_anew() -> None:
 
 def test_the_covariance_widens_what_is_searched_after_what_the_keys_say() -> None:
     wide = replace(PATH, spread=(5.0, 1.2))
-    _, keys, whole = boxes(wide, CONFIG)
+    keys, whole = boxes(wide, CONFIG)[-2:]
     assert extents(wide, CONFIG) == (15.0, pytest.approx(3.6))
     assert (keys.along_s, whole.along_s, keys.row_count, whole.row_count) == (10.0, 15.0, 3, 5)
     scans = [scan for _, scan, _ in searched(wide, CONFIG, 300.0)]
@@ -261,7 +261,7 @@ def test_a_search_says_what_it_will_not_reach_and_the_next_one_goes_on() -> None
     ][: len(begins) - 1]
     assert len({event["covered"] for event in ended}) >= 3
     shown = [seen.search for seen in flight.snapshots if seen.state == "SEARCH"]
-    assert shown[-1].startswith("-10.")
+    assert min(covered(text)[0] for text in shown if text) < -12.0
 
 
 def test_a_search_of_a_minute_covers_all_that_the_keys_say_and_is_taken_up_in_mid_row() -> None:
@@ -286,3 +286,11 @@ def test_a_place_is_as_far_off_the_path_as_its_seconds_and_degrees_say() -> None
     assert base is not None
     off_deg = hypot((point.az_deg - base.az_deg) * cos(radians(40.0)), point.el_deg - base.el_deg)
     assert off_deg == pytest.approx(hypot(4.0 * RATE_DEG_S, 0.7), rel=0.02)
+
+
+def test_where_2_sigma_along_are_beyond_the_keys_the_three_rows_about_the_track_go_so_far_first() -> None:
+    late = replace(PATH, spread=(6.2, 1.2))
+    scans = [scan for _, scan, _ in searched(late, CONFIG, 200.0)]
+    third = next(k for k, scan in enumerate(scans) if scan.row == 2)
+    assert set(scans[third].covered) == {0, 1, -1}
+    assert all(early_s < -12.3 and late_s > 12.3 for early_s, late_s in scans[third].covered.values())

@@ -51,10 +51,11 @@ class PointAt:
 
 @dataclass(frozen=True, slots=True)
 class PointAndPoll:
-    """Command angles and ask for the status after that: the normal cycle."""
+    """Command angles and ask for the status after that: the normal cycle.  tilt_deg: None leaves the tilt as it is."""
 
     az_deg: float
     el_deg: float
+    tilt_deg: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,6 +33,8 @@ class AcuStatus:
     is_at_down_limit: bool = False
     is_sector_high: bool = False
     turns_deg: float | None = None
+    tilt_deg: float | None = None  # of the tilt axis; None: there is none
+    is_tilt_moving: bool = False
     contradictions: tuple[str, ...] = ()  # what in it cannot be true at once, in words
 
     @property

@@ -29,7 +29,7 @@ from acu_daemon.assist.estimators.full.path_partials import (
     site_of,
     sky_partials,
 )
-from acu_daemon.model import AngleBias, Antenna, Correction, FitResult, Site
+from acu_daemon.model import AngleBias, Antenna, Correction, FitResult, Site, plunged_bias
 from acu_daemon.orbit.look import Look, look_at
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.pointing.antenna_model import AntennaModel
@@ -41,26 +41,44 @@ _NEAR_STEPS = 10.0 * np.array(STEPS)  # a path half a kilometre aside: a sigma d
 
 
 def encoder_look(
-    propagator: Propagator, tai_s: Array, site: Site, fit: FitResult | None, look: Callable[..., Look] = look_at
+    propagator: Propagator,
+    tai_s: Array,
+    site: Site,
+    fit: FitResult | None,
+    look: Callable[..., Look] = look_at,
+    *,
+    is_plunged: bool = False,
 ) -> Look:
     """What the encoders show when the antenna points at the satellite, at the times (N,).
 
     propagator: already corrected by the fit.  look: `look_at`, which it is without a fit, or `look_along`.
+    is_plunged: beyond the zenith, the azimuth half a turn further on, the elevation over 90 deg.
     Raises:  OrbitError: the propagator has no answer for one of the times.
     """
     seen = look(propagator, tai_s, site if fit is None else moved_site(site, fit.station_shift_enu_m))
-    if fit is not None and fit.bias != AngleBias():
-        seen = _biased(seen, fit.bias, site)
-        mount = Mount(**{name: getattr(fit.bias, name) for name in MOUNT_TERMS})
+    bias = AngleBias() if fit is None else plunged_bias(fit.bias) if is_plunged else fit.bias
+    if bias != AngleBias():
+        seen = _biased(seen, bias, site)
+        mount = Mount(**{name: getattr(bias, name) for name in MOUNT_TERMS})
         seen = seen if mount == Mount() else _on_encoders(seen, AntennaModel(mount))
-    return seen if site.antenna is None else _on_encoders(seen, site.antenna)
+    if not is_plunged:
+        return seen if site.antenna is None else _on_encoders(seen, site.antenna)
+    if site.antenna is not None:
+        return _wrapped(*site.antenna.with_rates_plunged(*_angles(seen)), range_m=seen.range_m)
+    az_deg, el_deg, _, az_rate_deg_s, el_rate_deg_s = _angles(seen)
+    return _wrapped(az_deg + 180.0, 180.0 - el_deg, az_rate_deg_s, -el_rate_deg_s, range_m=seen.range_m)
 
 
 def _on_encoders(seen: Look, antenna: Antenna) -> Look:
-    az_deg, el_deg, az_rate_deg_s, el_rate_deg_s = antenna.with_rates(
-        seen.az_deg, seen.el_deg, seen.range_m, seen.az_rate_deg_s, seen.el_rate_deg_s
-    )
-    return Look(az_deg % 360.0 % 360.0, el_deg, seen.range_m, az_rate_deg_s, el_rate_deg_s)
+    return _wrapped(*antenna.with_rates(*_angles(seen)), range_m=seen.range_m)
+
+
+def _angles(seen: Look) -> tuple[Array, Array, Array, Array, Array]:
+    return seen.az_deg, seen.el_deg, seen.range_m, seen.az_rate_deg_s, seen.el_rate_deg_s
+
+
+def _wrapped(az_deg: Array, el_deg: Array, az_rate_deg_s: Array, el_rate_deg_s: Array, *, range_m: Array) -> Look:
+    return Look(az_deg % 360.0 % 360.0, el_deg, range_m, az_rate_deg_s, el_rate_deg_s)
 
 
 def _biased(seen: Look, bias: AngleBias, site: Site) -> Look:

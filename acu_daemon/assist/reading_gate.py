@@ -101,7 +101,7 @@ class ReadingGate:
                 rejected.append(Rejected(row[0], TOO_FAST))
                 continue
             self._last = row
-            if row[2] > self._max_elevation_deg:
+            if self._max_elevation_deg < row[2] < 180.0 - self._max_elevation_deg:
                 rejected.append(Rejected(row[0], ABOVE_MAX_ELEVATION))
             else:
                 keep.append(k)
@@ -111,7 +111,7 @@ class ReadingGate:
         if self._last is None or self._azimuth is None or self._elevation is None:
             return False
         dt_s = tai_s - self._last[0]
-        cos_el = max(cos(radians(max(el_deg, self._last[2]))), 1e-3)
+        cos_el = max(min(abs(cos(radians(el_deg))), abs(cos(radians(self._last[2])))), 1e-3)
         far_az = self._azimuth.max_rate_deg_s * _RATE_MARGIN * dt_s + self._noise_az_deg / cos_el
         far_el = self._elevation.max_rate_deg_s * _RATE_MARGIN * dt_s + self._noise_el_deg
         return abs(wrap_180(az_deg - self._last[1])) > far_az or abs(el_deg - self._last[2]) > far_el

@@ -9,7 +9,7 @@ import typer
 from acu_daemon.cli.options import At, AtMonotonic, Config, Satellite, load_target, nearest_to_pass
 from acu_daemon.cli.rehearsal import clock_text, meet_in_rehearsal
 from acu_daemon.cli.serving import Control, Place, parse_place, serve_until_stopped
-from acu_daemon.cli.simulated import station_air
+from acu_daemon.cli.simulated import station_air, tilt_of
 from acu_daemon.config.load import load_station
 from acu_daemon.drivers.sa3842.codec import address_byte
 from acu_daemon.edge.clock import SystemClock
@@ -108,6 +108,7 @@ def command(
         station_air=station_air(station),
         seed=seed,
         address=address_byte(station.acu.address),
+        tilt=tilt_of(station),
     )
     for text in target.elements.errors:
         typer.echo(f"warning: {text}", err=True)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from acu_daemon.cli.options import coming_pass, load_target
 from acu_daemon.cli.station_wind import Beside
+from acu_daemon.config.to_settings import leaning, planned_tilt
 from acu_daemon.control.tracking.pass_plan import plan_pass
 from acu_daemon.schedule.book import Entry
 
@@ -36,7 +37,7 @@ class NextRise:
         station, coming = target.station, coming_pass(target, rise_tai_s - 60.0)
         plan = plan_pass(
             target.elements.propagator,
-            station.site,
+            leaning(station.site, planned_tilt(station, target.elements.propagator, coming)),
             coming,
             entry.start_az_deg or 0.0,
             station.acu.azimuth.limits(),

@@ -12,7 +12,7 @@ import typer
 
 from acu_daemon.cli.options import Config, Satellite, Target, coming_pass, load_target, parse_utc
 from acu_daemon.cli.outputs import refuse_no_picture, refuse_unwritable, write_ascii
-from acu_daemon.config.to_settings import keyhole_rules
+from acu_daemon.config.to_settings import keyhole_rules, leaning, planned_tilt
 from acu_daemon.control.tick_input import PassPlan
 from acu_daemon.control.tracking.approach import ACQUIRE_LEAD_S, BEGIN_S, way_s
 from acu_daemon.control.tracking.expected_way import ExpectedWay, expected_way
@@ -22,6 +22,7 @@ from acu_daemon.model import Pass, ZenithCrossing
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.pointing.outage import kept_out, sun_outages
 from acu_daemon.pointing.reach import zenith_text
+from acu_daemon.pointing.tilt import Tilt
 from acu_daemon.pointing.wrap import middle_deg
 
 ANGLES = ("path_az_deg", "path_el_deg", "antenna_az_deg", "antenna_el_deg", "off_deg")
@@ -36,6 +37,7 @@ class _Planned:
     plan: PassPlan
     way: ExpectedWay
     present_deg: tuple[float, float]  # where the antenna is taken to stand
+    tilt: Tilt | None  # of the pedestal; None: it has none that is moved
 
     @property
     def half_beam_deg(self) -> float:
@@ -96,13 +98,15 @@ def command(
 def _planned(target: Target, coming: Pass, now_tai_s: float, present_az_deg: float | None) -> _Planned:
     station, propagator = target.station, target.elements.propagator
     bounds, rules = station.bounds, keyhole_rules(station)
+    tilt = planned_tilt(station, propagator, coming)
+    site = leaning(station.site, tilt)
     present = (middle_deg(bounds.azimuth) if present_az_deg is None else present_az_deg, bounds.elevation.min_deg)
     plan = plan_pass(
-        *(propagator, station.site, coming, present[0], bounds.azimuth, now_tai_s),
+        *(propagator, site, coming, present[0], bounds.azimuth, now_tai_s),
         elevation=bounds.elevation,
         keyhole=rules,
     )
-    return _Planned(target, coming, plan, expected_way(propagator, station.site, plan, bounds, rules), present)
+    return _Planned(target, coming, plan, expected_way(propagator, site, plan, bounds, rules), present, tilt)
 
 
 def _lines(planned: _Planned) -> Iterator[str]:
@@ -120,6 +124,8 @@ def _lines(planned: _Planned) -> Iterator[str]:
     else:
         when = f"the antenna sets out {utc_text(coming.rise_tai_s - planned.lead_s, 0)}"
     yield f"way there  {way_deg:+.1f} deg of azimuth from {planned.present_deg[0]:g}; {when}"
+    if planned.tilt is not None:
+        yield f"tilt       {planned.tilt.angle_deg:+.1f} deg towards {planned.tilt.towards_deg:g} deg"
     for change in plan.unwindings:
         yield f"unwinding  {change.by_deg:+.0f} deg from {utc_text(change.tai_s, 0)} on, {change.for_s:.0f} s"
     if plan.crossing is not None:
@@ -156,6 +162,7 @@ def _data(planned: _Planned) -> dict[str, Any]:
         "start_az_deg": round(plan.start_az_deg, 4),
         "start_el_deg": round(plan.start_el_deg, 4),
         "lead_s": round(planned.lead_s, 1),
+        "tilt_deg": None if planned.tilt is None else planned.tilt.angle_deg,
         "note": plan.note,
         "unwindings": [
             {"utc": utc_text(one.tai_s, 1), "by_deg": one.by_deg, "for_s": round(one.for_s, 1)}

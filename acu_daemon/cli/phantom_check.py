@@ -9,7 +9,7 @@ import structlog
 from acu_daemon.cli.options import coming_pass, load_target
 from acu_daemon.cli.pass_checks import CHECKS_S
 from acu_daemon.cli.station_wind import Beside
-from acu_daemon.config.to_settings import control_config, driver_of, keyhole_rules
+from acu_daemon.config.to_settings import control_config, driver_of, keyhole_rules, leaning, planned_tilt
 from acu_daemon.control.phantom import PhantomPass, fly_phantom
 from acu_daemon.errors import AcuDaemonError
 from acu_daemon.pointing.wrap import middle_deg, nearest_turn
@@ -69,11 +69,13 @@ class PhantomCheck:
         station, azimuth = target.station, target.station.acu.azimuth.limits()
         near_deg = middle_deg(azimuth) if entry.start_az_deg is None else entry.start_az_deg
         turned_deg = nearest_turn(place[0], near_deg, azimuth)
+        coming = coming_pass(target, max(now_tai_s, entry.rise_tai_s - 60.0))
+        tilt = planned_tilt(station, target.elements.propagator, coming)
         return fly_phantom(
             target.elements.propagator,
-            station.site,
-            coming_pass(target, max(now_tai_s, entry.rise_tai_s - 60.0)),
-            control_config(station, target.satellite, driver_of(station), 0.0),
+            leaning(station.site, tilt),
+            coming,
+            control_config(station, target.satellite, driver_of(station), 0.0, tilt),
             keyhole_rules(station),
             (place[0] if turned_deg is None else turned_deg, place[1]),
         )

@@ -19,7 +19,7 @@ from acu_daemon.assist.session.replay_readings import BUFFER_S, Replayed, replay
 from acu_daemon.cli.options import SPARE_S, Target, lacking, load_target, whose_recording
 from acu_daemon.cli.outputs import refuse_unwritable
 from acu_daemon.cli.replay_wire import replay_wire
-from acu_daemon.config.to_settings import estimator_settings, pedestal_text
+from acu_daemon.config.to_settings import estimator_settings, may_plunge, pedestal_text
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.edge.carry_over_file import reason_of
 from acu_daemon.edge.mount_memory_file import from_json
@@ -197,6 +197,7 @@ def _replay_to(job: _Job, name: str, out: Path) -> list[Replayed]:
         estimator_settings(station, job.target.satellite),
         station.acu.azimuth.limits(),
         memory=job.memory,
+        may_plunge=may_plunge(station),
     )
     on_progress = _progress(name, len(job.lines)) if sys.stderr.isatty() else None
     results = list(replay(setup, job.timed, station.receiver.lock_dwell_s, on_progress))

@@ -17,7 +17,14 @@ from acu_daemon.cli.options import (
     coming_pass,
     ending,
 )
-from acu_daemon.config.to_settings import control_config, driver_of, estimator_settings
+from acu_daemon.config.to_settings import (
+    control_config,
+    driver_of,
+    estimator_settings,
+    leaning,
+    may_plunge,
+    planned_tilt,
+)
 from acu_daemon.control.state import ControlState
 from acu_daemon.daemon.service import PassJob
 from acu_daemon.edge.clock import SystemClock
@@ -130,18 +137,21 @@ def make_job(
     """What the files say, as the daemon needs it."""
     station = target.station
     driver = driver_of(station)
+    tilt = planned_tilt(station, target.elements.propagator, coming)
+    control = control_config(station, target.satellite, driver, link.byte_time_s, tilt)
     return PassJob(
         refit=RefitSetup(
             target.elements.propagator,
-            station.site,
+            leaning(station.site, tilt),
             station.tracking.estimator,
             estimator_settings(station, target.satellite),
             station.acu.azimuth.limits(),
             carried=carried,
             zenith_objective=station.tracking.zenith_objective,
             memory=memory,
+            may_plunge=may_plunge(station),
         ),
-        control=replace(control_config(station, target.satellite, driver, link.byte_time_s), is_rehearsal=is_rehearsal),
+        control=replace(control, is_rehearsal=is_rehearsal),
         coming=coming,
         horizon_s=station.tracking.horizon_s,
         low_water_s=station.tracking.low_water_s,

@@ -13,6 +13,7 @@ from acu_daemon.cli.pass_checks import Check
 from acu_daemon.cli.report_after import report_after
 from acu_daemon.cli.station_wind import Beside
 from acu_daemon.config.load import satellite_names
+from acu_daemon.control.tracking.pass_plan import PlanAnswer, PlanRequest
 from acu_daemon.daemon.background import fit_deadline_s
 from acu_daemon.daemon.service import PassJob
 from acu_daemon.edge.clock import Clock
@@ -52,6 +53,9 @@ class NoFits:
 
     async def refit(self, request: RefitRequest) -> RefitReply:
         raise RuntimeError(f"nothing is fitted between passes: {request}")
+
+    async def plan(self, asked: PlanRequest) -> PlanAnswer:
+        raise RuntimeError(f"nothing is planned between passes: {asked}")
 
     async def close(self) -> None:
         """Nothing runs."""

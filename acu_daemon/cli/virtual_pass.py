@@ -16,7 +16,7 @@ from acu_daemon.assist.mount_memory.whole_pass import PassEstimate
 from acu_daemon.assist.session.refit import RefitSetup
 from acu_daemon.cli.options import Target, coming_pass
 from acu_daemon.cli.run_setup import make_job
-from acu_daemon.cli.simulated import station_air
+from acu_daemon.cli.simulated import station_air, tilt_of
 from acu_daemon.cli.tape_head import head_of
 from acu_daemon.daemon.service import Outcome, Service, SignalSource
 from acu_daemon.daemon.snapshot import Snapshot
@@ -140,6 +140,7 @@ def fly(
             seed,
             address_byte(acu_section.address),
             target.station.site.skyline,
+            tilt_of(target.station),
         )
         acu = make_acu(parts)
         acu.observer = flight.rows.append

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from acu_daemon.cli.simulated import tilt_of
 from acu_daemon.cli.station_runs import StationRuns
 from acu_daemon.cli.station_setup import StationSetup, first_usable
 from acu_daemon.cli.virtual_pass import events_to
@@ -101,6 +102,7 @@ def run_days(
             1,
             address_byte(acu_section.address),
             first.station.site.skyline,
+            tilt_of(first.station),
         )
         acu = FakeAcu(parts)
         acu.observer = days.rows.append

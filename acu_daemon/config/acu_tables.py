@@ -11,6 +11,9 @@ from acu_daemon.drivers.sa3842.codec import address_byte
 from acu_daemon.edge.link import make_link
 from acu_daemon.errors import UsageError
 from acu_daemon.model import AxisLimits
+from acu_daemon.pointing.tilt import TiltAxis
+
+MOST_SA3842_EL_DEG = 179.99  # two's complement: 180 deg would be -180
 
 
 class AxisSection(Section):
@@ -60,8 +63,36 @@ class ElevationSection(AxisSection):
         ge=-90,
         le=180,
         json_schema_extra={"range": "min_deg to 180"},
-        description="Upper soft limit; above 90 the antenna can plunge.  Decides the same.",
+        description=(
+            "Upper soft limit; above 90 the antenna can plunge, and from 180 less min_elevation_deg on a pass near the "
+            "zenith is flown over the top (docs/pass-plan.md, Over the top).  Decides the same."
+        ),
     )
+
+
+class TiltSection(AxisSection):
+    min_deg: float = Field(ge=-45, le=0, description="Lower limit of the tilt.  Decides which tilts a pass may have.")
+    max_deg: float = Field(ge=0, le=45, description="Upper limit.  Decides the same.")
+    max_rate_deg_s: float = Field(
+        gt=0,
+        le=90,
+        description="The fastest that it turns.  Decides how long before a pass the antenna sets out.",
+    )
+    max_acceleration_deg_s2: float = Field(
+        default=0.5, gt=0, le=360, description="How fast it gets there.  Decides the same."
+    )
+    towards_deg: float = Field(
+        default=90.0,
+        ge=0,
+        lt=360,
+        description=(
+            "The azimuth towards which a positive tilt leans the pedestal; 90: a tilt east and west.  Decides where "
+            "the beam points."
+        ),
+    )
+
+    def axis(self) -> TiltAxis:
+        return TiltAxis(self.limits(), self.towards_deg)
 
 
 def _address(value: object) -> str:
@@ -88,6 +119,13 @@ class AcuSection(Section):
     )
     azimuth: AxisSection = Field(description="Limits of the azimuth axis and its drive.")
     elevation: ElevationSection = Field(description="Limits of the elevation axis and its drive.")
+    tilt: TiltSection | None = Field(
+        default=None,
+        description=(
+            "A motorised tilt under the pedestal; left out: there is none, or it stays as it is (docs/pass-plan.md, "
+            "Tilt)."
+        ),
+    )
     dialect: Literal["sa3842", "rotctl"] = Field(
         default="sa3842",
         description=(
@@ -135,6 +173,11 @@ class AcuSection(Section):
         if self.dialect == "rotctl" and not self.url.startswith("tcp:"):
             expected = 'expected url = "tcp://HOST:4533", where rotctld is'
             raise ValueError(f'dialect = "rotctl": {expected}, not {self.url!r}')
+        if self.dialect == "sa3842" and self.elevation.max_deg > MOST_SA3842_EL_DEG:
+            told = f"its angles end before 180 deg, expected at most {MOST_SA3842_EL_DEG:g}"
+            raise ValueError(f'elevation.max_deg = {self.elevation.max_deg:g}: dialect = "sa3842": {told}')
+        if self.dialect != "sa3842" and self.tilt is not None:
+            raise ValueError(f'tilt: dialect = "{self.dialect}" has no tilt register, leave the table out')
         if self.dialect != "rotctl" and "dead_band_deg" in self.model_fields_set:
             raise ValueError(f'dead_band_deg: dialect = "{self.dialect}" has none, leave it out')
         return self

@@ -43,6 +43,8 @@ class ControlConfig:
     response_time_s: float = 60.0  # an antenna that may not be moved, and that the sun reaches within it, is an alarm
     has_signal: bool = True  # autotrack gives one; else a pass is flown by program track
     receiver: SignalRules | None = None  # of a receiver beside the ACU; None: there is none that tells
+    tilt_deg: float | None = None  # of the pedestal in this pass; None: it has no tilt that is moved
+    tilt: AxisLimits | None = None
     clock_alarm_deg: float = 0.1  # an error of UTC counts from here on, at the sky's present rate
     azimuth: AxisLimits = field(init=False)  # the envelope's
     elevation: AxisLimits = field(init=False)

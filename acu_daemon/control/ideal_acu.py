@@ -60,6 +60,7 @@ class IdealAcu:
             az_deg=az_deg % 360.0,
             el_deg=self.el.position_deg,
             is_sector_high=can.has_sector_bit and az_deg >= middle_deg(self._config.azimuth),
+            tilt_deg=self._config.tilt_deg,
             turns_deg=az_deg if can.is_azimuth_continuous else None,
         )
 

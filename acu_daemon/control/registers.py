@@ -181,7 +181,7 @@ def _sent(
         commands=(*registers.commands[-2:], Sent(az_deg, el_deg, is_free)),
         goal_az_deg=goal_az_deg,
     )
-    return with_parts(state, registers=registers), PointAndPoll(az_deg, el_deg)
+    return with_parts(state, registers=registers), PointAndPoll(az_deg, el_deg, config.tilt_deg)
 
 
 def note_as_if_written(state: ControlState, written: ControlState) -> ControlState:

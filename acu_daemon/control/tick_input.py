@@ -128,6 +128,7 @@ class PassPlan:
     crossing: ZenithCrossing | None = None  # of the zenith, by the elements
     zenith_turn: int = 0  # 1 or -1: the azimuth rises or falls past the zenith, whichever way the path does; 0: as it
     hidden_tai_s: tuple[tuple[float, float], ...] = ()  # when it is behind the skyline, by its elements
+    is_plunged: bool = False  # it begins beyond the zenith, where the antenna was found
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,9 @@ from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.finite import is_fit
 from acu_daemon.control.tick_input import PassPlan
 from acu_daemon.control.tracking.approach import lead_s
+from acu_daemon.control.tracking.causes import may_lead_past_zenith
 from acu_daemon.control.tracking.path_offset import resume_pass
-from acu_daemon.control.tracking.state_table import ACTIVE, AUTOTRACKING, TrackState
+from acu_daemon.control.tracking.state_table import ACTIVE, AUTOTRACKING, TRACKING, TrackState
 from acu_daemon.control.tracking.track_frame import extents
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.edge.tape import Note, no_note
@@ -23,6 +24,7 @@ from acu_daemon.errors import OrbitError
 from acu_daemon.model import FitResult, Model, Readings, ZenithCrossing
 from acu_daemon.orbit.propagator import spans_tai_s
 from acu_daemon.pointing.keyhole import longest_window_s
+from acu_daemon.pointing.plunge import PLUNGED_DEG
 
 REFIT_PERIOD_S = 1.0  # an accepted fit replaces the buffer at least once a second while locked
 PAST_S = 1.0  # the buffer starts this long before now: readings are compared at the time of their sample
@@ -102,6 +104,7 @@ class BufferKeeper:
         return self._request(now_tai_s, self._area.take_readings())
 
     def _request(self, now_tai_s: float, readings: Readings) -> RefitRequest:
+        state, sky = self._area.state, self._area.sky
         past_s, ahead_s = self._reach_s(now_tai_s)
         start_tai_s = now_tai_s - PAST_S - past_s
         known_s = self._spans_tai_s[-1][1] - start_tai_s
@@ -111,14 +114,27 @@ class BufferKeeper:
             horizon_s=max(min(self._horizon_s + PAST_S + past_s + ahead_s, known_s), LEAST_HORIZON_S),
             now_tai_s=now_tai_s,
             near_az_deg=self._near_az_deg(now_tai_s),
-            zenith_turn=self._area.sky.plan.zenith_turn if self._area.sky.plan else 0,
+            zenith_turn=sky.plan.zenith_turn if sky.plan else 0,
             in_hand=self._in_hand(now_tai_s),
+            may_plunge=state.tracking.track not in AUTOTRACKING or may_lead_past_zenith(sky, self._control),
+            is_plunged=self._is_plunged(now_tai_s),
         )
+
+    def _is_plunged(self, now_tai_s: float) -> bool:
+        """Whether the antenna tracks the pass beyond the zenith, and is on no way over it; not one that was left so."""
+        state, sky = self._area.state, self._area.sky
+        crossing = sky.prediction.crossing if sky.prediction else None
+        is_here = state.tracking.track in TRACKING or (sky.plan is not None and sky.plan.is_plunged)
+        is_past = crossing is None or now_tai_s > crossing.return_tai_s
+        return state.intake.el_deg > PLUNGED_DEG and is_here and is_past
 
     def _in_hand(self, now_tai_s: float) -> ZenithCrossing | None:
         """The crossing of the zenith that is gone on with, though the fit moves its path."""
         crossing = self._area.sky.prediction.crossing if self._area.sky.prediction else None
-        return crossing if crossing is not None and now_tai_s >= crossing.departure_tai_s - FROZEN_S else None
+        if crossing is None or now_tai_s < crossing.departure_tai_s - FROZEN_S:
+            return None
+        is_missed = crossing.is_plunge and self._area.state.tracking.track in AUTOTRACKING
+        return None if is_missed and now_tai_s > crossing.return_tai_s else crossing
 
     def is_filled(self, now_tai_s: float, low_water_s: float) -> bool:
         """Whether the buffer holds so much ahead of now, and before it what a satellite that is late asks for."""

@@ -35,6 +35,7 @@ def status_rows(seen: Snapshot) -> list[tuple[str, str]]:
         ("foreseen", seen.phantom),
         ("wind", seen.wind.removeprefix("wind ")),
         ("paused", f"no pass is begun until {seen.paused_until_utc}" if seen.paused_until_utc else ""),
+        ("tilt", seen.tilt),
         ("elements", "; ".join(text for text in (seen.elements, seen.elements_problem) if text)),
         ("steers", steering(seen)),
         ("antenna", _antenna(seen)),

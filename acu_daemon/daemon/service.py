@@ -19,7 +19,7 @@ from acu_daemon.control.safety.foreign_stop import release
 from acu_daemon.control.state import ControlState, remembered
 from acu_daemon.control.tick_input import Asking, PassPlan
 from acu_daemon.control.tracking.approach import lead_s
-from acu_daemon.control.tracking.pass_plan import is_due, is_tracked, plan_pass, why_over
+from acu_daemon.control.tracking.pass_plan import PlanAnswer, PlanRequest, is_due, is_tracked, why_over
 from acu_daemon.control.tracking.state_table import ACTIVE
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.background import Background
@@ -38,7 +38,6 @@ from acu_daemon.edge.tape import Note, no_note
 from acu_daemon.errors import NoAcuError, UsageError
 from acu_daemon.model import FitResult, Pass, Reading
 from acu_daemon.orbit.timescales import utc_text
-from acu_daemon.pointing.outage import kept_out, sun_outages
 from acu_daemon.pointing.reach import zenith_text
 from acu_daemon.units import Array
 
@@ -173,6 +172,7 @@ class Service:
             control=job.control,
             on_fit=on_fit,
             on_estimate=on_estimate,
+            on_plan=self._tell_plan,
             note=note,
         )
         self._foreground = Foreground(
@@ -289,6 +289,9 @@ class Service:
             why = self._port.problem or "no answer"
             raise NoAcuError(f"no good poll within {FIRST_POLL_S:g} s: {why}")
         axes = self._job.control
+        status = self._area.state.intake.status
+        if axes.tilt_deg is not None and status is not None and status.tilt_deg is None:
+            raise UsageError("[acu.tilt] is given, and the ACU says that it has no tilt: leave it out")
         identity, is_sure = self._area.state.startup.identity, self._area.state.startup.is_identity_sure
         if identity is not None and is_sure and (why := beyond_own_limits(identity, axes.azimuth, axes.elevation)):
             raise UsageError(f"{identity}: {why}")
@@ -299,13 +302,19 @@ class Service:
 
     def _plan(self, now_tai_s: float) -> None:
         job, state = self._job, self._area.state
-        axes = job.control
         if job.move is not None:
             self._background.set_plan(job.move)
         if job.move is not None or job.coming is None:
             return
+        if self._background.is_planning:
+            return
         self._note(("P", now_tai_s))
-        plan = plan_of(job.refit, job.control, job.coming, state, now_tai_s)
+        self._background.ask_plan(plan_request(job.refit, job.control, job.coming, state, now_tai_s))
+
+    def _tell_plan(self, planned: PlanAnswer) -> None:
+        job, state, plan, now_tai_s = self._job, self._area.state, planned.plan, self._clock.tai_s()
+        if job.coming is None:
+            return
         self._log.info(
             "pass.planned",
             rise_in_s=round(plan.rise_tai_s - now_tai_s, 1),
@@ -323,15 +332,14 @@ class Service:
             self._log.info("pass.zenith", what=zenith_text(plan.crossing))
         for one in plan.beyond:
             self._log.warning("pass.beyond_limits", axis=one.axis, for_s=round(one.duration_s, 1), what=str(one))
-        envelope = axes.envelope
-        for outage in sun_outages(job.refit.propagator, job.refit.site, envelope.sun, job.coming):
+        envelope = job.control.envelope
+        for outage in planned.sun:
             policy = envelope.sun.policy if envelope.sun else ""
             self._log.warning("pass.sun", least_deg=round(outage.least_deg, 2), policy=policy, what=str(outage))
-        for kept in kept_out(job.refit.propagator, job.refit.site, envelope.keep_outs, job.coming):
+        for kept in planned.keep_outs:
             self._log.warning("pass.keep_out", zone=kept.name, for_s=round(kept.duration_s, 1), what=str(kept))
         for begin, end in job.coming.hidden_tai_s:
             self._log.info("pass.hidden", from_utc=utc_text(begin, 0), for_s=round(end - begin, 1))
-        self._background.set_plan(plan)
 
     async def _safe_stop(self) -> bool:
         self._port.abandon()
@@ -438,19 +446,12 @@ class Service:
         )
 
 
-def plan_of(setup: RefitSetup, control: ControlConfig, coming: Pass, state: ControlState, now_tai_s: float) -> PassPlan:
-    """The plan of a pass from where the antenna is now."""
-    return plan_pass(
-        setup.propagator,
-        setup.site,
-        coming,
-        state.intake.az_deg,
-        control.azimuth,
-        now_tai_s,
-        elevation=control.elevation,
-        learned_count=state.turn.learned_count,
-        keyhole=setup.keyhole,
-    )
+def plan_request(
+    setup: RefitSetup, control: ControlConfig, coming: Pass, state: ControlState, now_tai_s: float
+) -> PlanRequest:
+    """Ask for the plan of a pass from where the antenna is now."""
+    place = state.intake.az_deg, state.intake.el_deg
+    return PlanRequest(coming, *place, control.envelope, now_tai_s, state.turn.learned_count, setup.keyhole)
 
 
 def _innermost(error: Exception) -> Exception:

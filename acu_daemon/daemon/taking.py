@@ -9,6 +9,7 @@ from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.stow import why_not_sent
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick_input import STOWED_BY_US, Sky, StowBy
+from acu_daemon.control.tracking.causes import is_tilt_set
 from acu_daemon.control.tracking.hills import hidden_until_tai_s, is_hidden
 from acu_daemon.control.tracking.off_path import off_path
 from acu_daemon.control.tracking.path_offset import is_heard_beside
@@ -89,6 +90,7 @@ def take_snapshot(
         set_in_s=coming.set_tai_s + late_s - now_tai_s if coming else None,
         culmination_deg=coming.culmination_el_deg if coming else None,
         zenith=_zenith(area.sky, now_tai_s),
+        tilt=_tilt(state, control),
     )
     return replace(seen, verdict=verdict(seen).word)
 
@@ -183,6 +185,16 @@ def _stow_alarm(state: ControlState, now_tai_s: float, control: ControlConfig) -
         return ""
     why = why_not_sent(state, now_tai_s, control)
     return f"not stowed, though {WANTS_STOW[by]}: {why}" if why else ""
+
+
+def _tilt(state: ControlState, control: ControlConfig) -> str:
+    """How the pedestal leans, and how it should."""
+    status = state.intake.status
+    if control.tilt_deg is None or status is None or status.tilt_deg is None:
+        return ""
+    if is_tilt_set(status, control):
+        return f"{control.tilt_deg:+.1f} deg, set"
+    return f"{status.tilt_deg:+.1f} deg, {control.tilt_deg:+.1f} asked: the pass waits for it"
 
 
 def _arming(state: ControlState, control: ControlConfig) -> str:

@@ -17,10 +17,11 @@ from acu_daemon.control.orders import Orders
 from acu_daemon.control.receiver_signal import SignalSample
 from acu_daemon.control.safety.arming import begin_run
 from acu_daemon.control.tick_input import Arrival, Asking, PassPlan
+from acu_daemon.control.tracking.pass_plan import planned_pass
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.buffer_keeper import BufferKeeper
 from acu_daemon.daemon.decider import Decider
-from acu_daemon.daemon.service import PassJob, plan_of
+from acu_daemon.daemon.service import PassJob, plan_request
 from acu_daemon.edge.tape import Record
 from acu_daemon.edge.tape_text import FitAnswer
 from acu_daemon.errors import OrbitError
@@ -141,7 +142,8 @@ class TapeReplay:
     def _plan(self, now_tai_s: float) -> None:
         job = self._job
         if job.coming is not None:
-            self._planned = plan_of(job.refit, job.control, job.coming, self.area.state, now_tai_s)
+            asked = plan_request(job.refit, job.control, job.coming, self.area.state, now_tai_s)
+            self._planned = planned_pass(job.refit.propagator, job.refit.site, asked).plan
 
     # The line
 

@@ -1,4 +1,4 @@
-"""The fit runner: a spawned, niced child process, or inline with a fixed virtual latency.
+"""The fit runner, which plans passes too: a spawned, niced child process, or inline with a fixed virtual latency.
 
 The foreground never waits for it; a child that dies or hangs is replaced and given the pass's readings again.
 """
@@ -8,12 +8,14 @@ import contextlib
 import pickle
 import signal
 from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Protocol
 
 import structlog
 
 from acu_daemon.assist.session.refit import RefitReply, RefitRequest, RefitSetup, Refitter
+from acu_daemon.control.tracking.pass_plan import PlanAnswer, PlanRequest, planned_pass
 from acu_daemon.edge.child_process import start_python
 from acu_daemon.edge.fit_child import LENGTH
 from acu_daemon.errors import AcuDaemonError
@@ -38,13 +40,16 @@ class FitRunner(Protocol):
 
     async def refit(self, request: RefitRequest) -> RefitReply: ...
 
+    async def plan(self, asked: PlanRequest) -> PlanAnswer: ...
+
     async def close(self) -> None: ...
 
 
 class InlineFitRunner:
-    """Computes in the loop and answers after a fixed latency of the loop's (virtual) time."""
+    """Computes in the loop and answers after a fixed latency of the loop's (virtual) time; a plan is there at once."""
 
     def __init__(self, setup: RefitSetup, latency_s: float = 0.05) -> None:
+        self._setup = setup
         self._refitter = Refitter(setup)
         self._latency_s = latency_s
 
@@ -53,12 +58,15 @@ class InlineFitRunner:
         await asyncio.sleep(self._latency_s)
         return reply
 
+    async def plan(self, asked: PlanRequest) -> PlanAnswer:
+        return planned_pass(self._setup.propagator, self._setup.site, asked)
+
     async def close(self) -> None:
         """Nothing runs."""
 
 
 class ProcessFitRunner:
-    """Computes in a child process.  One request at a time; owned by the background task."""
+    """Computes in a child process.  One question at a time; owned by the background task."""
 
     def __init__(self, setup: RefitSetup, timeout_s: float = 5.0) -> None:
         self._setup = setup
@@ -73,6 +81,20 @@ class ProcessFitRunner:
         """Ask the child.  Raises: FitDiedError, after which the next call starts a new child; FitFailedError."""
         if len(request.readings):
             self._given.append(request.readings)
+        reply = await self._answer(request, if_new=lambda: _with_readings(request, self._given))
+        if isinstance(reply, RefitReply):
+            return reply
+        raise FitFailedError(str(reply))
+
+    async def plan(self, asked: PlanRequest) -> PlanAnswer:
+        """Ask the child for the plan of a pass.  Raises: as `refit`."""
+        reply = await self._answer(asked, if_new=lambda: asked)
+        if isinstance(reply, PlanAnswer):
+            return reply
+        raise FitFailedError(str(reply))
+
+    async def _answer(self, question: object, if_new: Callable[[], object]) -> Any:
+        """What the child says to a question; if_new: the question to one that has just been started."""
         if self._child is not None and self._child.returncode is not None:
             structlog.get_logger("fit").warning("fit.process_ended", code=self._child.returncode, action="replaced")
         is_new = self._child is None or self._child.returncode is not None
@@ -81,9 +103,8 @@ class ProcessFitRunner:
             async with asyncio.timeout(timeout_s):
                 if is_new:
                     await self._start()
-                    request = _with_readings(request, self._given)
-                await self._send(request)
-                reply = await self._receive()
+                await self._send(if_new() if is_new else question)
+                return await self._receive()
         except TimeoutError:
             await self.close()
             raise FitDiedError(f"the fit process gave no answer within {timeout_s:g} s") from None
@@ -96,9 +117,6 @@ class ProcessFitRunner:
         except BaseException:
             await self.close()  # cancelled in mid-answer: what the child still says must not meet the next question
             raise
-        if isinstance(reply, RefitReply):
-            return reply
-        raise FitFailedError(str(reply))
 
     @property
     def pid(self) -> int | None:

@@ -17,6 +17,7 @@ from acu_daemon.errors import OrbitError
 
 if TYPE_CHECKING:
     from acu_daemon.assist.session.refit import RefitReply, RefitRequest
+    from acu_daemon.control.tracking.pass_plan import PlanAnswer
 
 LENGTH = struct.Struct("<Q")
 NICENESS = 10  # more than the daemon's, and at least this where that one's is negative
@@ -49,6 +50,7 @@ def serve() -> None:
     import numpy as np
 
     from acu_daemon.assist.session.refit import Refitter
+    from acu_daemon.control.tracking.pass_plan import PlanRequest, planned_pass
     from acu_daemon.orbit.timescales import adopt_leap_dates
 
     gc.freeze()
@@ -57,12 +59,15 @@ def serve() -> None:
     adopt_leap_dates(dates)  # the daemon's, whatever the system's list has become meanwhile
     refitter = Refitter(setup)
     while True:
-        request: RefitRequest = _receive()
-        reply: RefitReply | str
+        request: RefitRequest | PlanRequest = _receive()
+        reply: RefitReply | PlanAnswer | str
         try:
-            reply = refitter.refit(request)
+            if isinstance(request, PlanRequest):
+                reply = planned_pass(setup.propagator, setup.site, request)
+            else:
+                reply = refitter.refit(request)
         except (OrbitError, ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
-            reply = f"the fit failed: {error}"
+            reply = f"it failed: {error}"
         data = pickle.dumps(reply, protocol=pickle.HIGHEST_PROTOCOL)
         replies.write(LENGTH.pack(len(data)) + data)
         replies.flush()

@@ -1,6 +1,7 @@
-"""Between a geometric direction and the encoders: refraction, then the mount; both ways, with partials.  Pure.
+"""Between a geometric direction and the encoders: refraction, tilt, mount; both ways, with partials.  Pure.
 
-Geometric (a vacuum, from the orbit) -> apparent (in air) -> encoders (what the ACU counts).  Everything that compares a
+Geometric (a vacuum, from the orbit) -> apparent (in air) -> about the axes, where a tilt leans the pedestal -> encoders
+(what the ACU counts).  Everything that compares a
 reading with an orbit, or commands a direction, goes through here once.
 """
 
@@ -12,6 +13,7 @@ import numpy.typing as npt
 
 from acu_daemon.pointing.mount import TERMS, Mount, shares
 from acu_daemon.pointing.refraction import Refraction
+from acu_daemon.pointing.tilt import Tilt
 from acu_daemon.units import Array
 
 
@@ -43,6 +45,7 @@ class AntennaModel:
     mount: Mount = Mount()
     refraction: Refraction | None = None
     refraction_scale: float = 1.0
+    tilt: Tilt | None = None  # None: the pedestal stands upright
 
     def encoders_deg(
         self, az_deg: npt.ArrayLike, el_deg: npt.ArrayLike, range_m: npt.ArrayLike = np.inf
@@ -50,6 +53,8 @@ class AntennaModel:
         """Turn a geometric direction, and the satellite's distance, into what the encoders read on it."""
         if self.refraction is not None:
             el_deg = self.refraction.apparent_el_deg(el_deg, range_m, self.refraction_scale)
+        if self.tilt is not None:
+            az_deg, el_deg = self.tilt.to_pedestal(az_deg, el_deg)
         return self.mount.encoders_deg(az_deg, el_deg)
 
     def geometric_deg(
@@ -57,9 +62,14 @@ class AntennaModel:
     ) -> tuple[Array, Array]:
         """Turn what the encoders read into the geometric direction of the satellite, whose distance is range_m.
 
-        The inverse of encoders_deg.  A distance that is wrong by a tenth costs 0.0006 deg at 5 deg of elevation.
+        The inverse of encoders_deg; also of a plunged antenna, whose elevation is over 90 deg.
+        A distance that is wrong by a tenth costs 0.0006 deg at 5 deg of elevation.
         """
         az, el = self.mount.beam_deg(encoder_az_deg, encoder_el_deg)
+        is_plunged = el > 90.0
+        az, el = np.where(is_plunged, az + 180.0, az), np.where(is_plunged, 180.0 - el, el)
+        if self.tilt is not None:
+            az, el = self.tilt.from_pedestal(az, el)
         if self.refraction is not None:
             el = self.refraction.geometric_el_deg(el, range_m, self.refraction_scale)
         return az, el
@@ -102,6 +112,29 @@ class AntennaModel:
         if self.refraction is not None:
             el_deg, slope, _ = self.refraction.apparent_with_slope(el_deg, range_m, self.refraction_scale)
             el_rate_deg_s = slope * el_rate_deg_s
+        return self._on_mount(*self._leaning(az_deg, el_deg, az_rate_deg_s, el_rate_deg_s))
+
+    def with_rates_plunged(
+        self, az_deg: Array, el_deg: Array, range_m: Array, az_rate_deg_s: Array, el_rate_deg_s: Array
+    ) -> tuple[Array, Array, Array, Array]:
+        """The same for an antenna beyond the zenith: azimuth half a turn further on, elevation over 90 deg."""
+        if self.refraction is not None:
+            el_deg, slope, _ = self.refraction.apparent_with_slope(el_deg, range_m, self.refraction_scale)
+            el_rate_deg_s = slope * el_rate_deg_s
+        az_deg, el_deg, az_rate_deg_s, el_rate_deg_s = self._leaning(az_deg, el_deg, az_rate_deg_s, el_rate_deg_s)
+        return self._on_mount(az_deg + 180.0, 180.0 - el_deg, az_rate_deg_s, -el_rate_deg_s)
+
+    def _leaning(
+        self, az_deg: Array, el_deg: Array, az_rate_deg_s: Array, el_rate_deg_s: Array
+    ) -> tuple[Array, Array, Array, Array]:
+        if self.tilt is None:
+            return az_deg, el_deg, az_rate_deg_s, el_rate_deg_s
+        rates = self.tilt.rates_to_pedestal(az_deg, el_deg, az_rate_deg_s, el_rate_deg_s)
+        return *self.tilt.to_pedestal(az_deg, el_deg), *rates
+
+    def _on_mount(
+        self, az_deg: Array, el_deg: Array, az_rate_deg_s: Array, el_rate_deg_s: Array
+    ) -> tuple[Array, Array, Array, Array]:
         encoder_az_deg, encoder_el_deg = self.mount.encoders_deg(az_deg, el_deg)
         if self.mount.is_square:
             return encoder_az_deg, encoder_el_deg, az_rate_deg_s, el_rate_deg_s
@@ -119,9 +152,17 @@ class AntennaModel:
         if self.refraction is not None:
             el, slope, by_scale = self.refraction.apparent_with_slope(el, range_m, self.refraction_scale)
         az, el, slope, by_scale = np.broadcast_arrays(az, el, slope, by_scale)
+        ground_az, ground_el = az, el
+        if self.tilt is not None:
+            az, el = self.tilt.to_pedestal(az, el)
         azimuths, elevations = shares(az, el)
         terms = self.mount.terms_deg()
         (aa, ae), (ea, ee) = self.mount.by_direction(az, el)
+        if self.tilt is not None:
+            one, zero = np.ones_like(el), np.zeros_like(el)
+            at, et = self.tilt.rates_to_pedestal(ground_az, ground_el, one, zero)  # by the ground's azimuth
+            ah, eh = self.tilt.rates_to_pedestal(ground_az, ground_el, zero, one)  # and elevation
+            aa, ae, ea, ee = aa * at + ae * et, aa * ah + ae * eh, ea * at + ee * et, ea * ah + ee * eh
         by_direction = np.stack([np.stack([aa, ae * slope], axis=-1), np.stack([ea, ee * slope], axis=-1)], axis=-2)
         by_state = np.stack(
             [

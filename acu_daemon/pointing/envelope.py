@@ -17,6 +17,7 @@ from acu_daemon.model import AxisLimits
 from acu_daemon.pointing.keep_out import KeepOut, Sun, Zone
 from acu_daemon.pointing.mount import Mount
 from acu_daemon.pointing.skyline import Skyline
+from acu_daemon.pointing.tilt import Tilt
 from acu_daemon.pointing.wrap import ROUNDING_DEG
 from acu_daemon.units import Array
 
@@ -34,6 +35,7 @@ class Envelope:
     skyline: Skyline | None = None
     mount: Mount | None = None  # None: the encoders show the beam's direction
     stow_deg: tuple[float, float] | None = None  # where the ACU's own stow position is; None: not known
+    tilt: Tilt | None = None  # of the pedestal, during a pass
     has_zones: bool = field(init=False)  # whether the beam keeps out of anything
 
     def __post_init__(self) -> None:
@@ -54,7 +56,12 @@ class Envelope:
         """Direction of the beam, to 0.01 deg: azimuth of any turn from true north, elevation in air of -90 to 90."""
         if self.mount is not None:
             az_deg, el_deg = self.mount.beam_near(az_deg, el_deg)
-        return (az_deg + 180.0, 180.0 - el_deg) if el_deg > 90.0 else (az_deg, el_deg)
+        az_deg, el_deg = (az_deg + 180.0, 180.0 - el_deg) if el_deg > 90.0 else (az_deg, el_deg)
+        return (az_deg, el_deg) if self.tilt is None else self.tilt.beam_deg(az_deg, el_deg)
+
+    def is_bent(self, *el_deg: float) -> bool:
+        """Whether a way between such elevations is none on the sky that way_round knows: plunged, or leaning."""
+        return self.tilt is not None or max(el_deg) > 90.0
 
     # One direction, or (N,) of them at (N,) times
 

@@ -22,6 +22,7 @@ import numpy.typing as npt
 
 from acu_daemon.model import AxisLimits, ZenithCrossing
 from acu_daemon.pointing.axis import AxisState, step
+from acu_daemon.pointing.plunge import Branches, Over, way_over
 from acu_daemon.units import Array
 
 MARGIN = 0.98  # of the drive's rate and acceleration: with all of them the servo falls behind, less costs beam
@@ -33,6 +34,7 @@ SIDE_STEPS = 120
 LEAST_TURN_DEG = 120.0  # of a path past the zenith, for the azimuth to go the other way round
 LATE_S = 0.5  # a departure that is chosen anew is at least so far ahead
 COARSE_STEPS, MOST_STARTS = 4, 80  # half steps from departure to departure in the first look, and how many at most
+TAKEOVER_RATES = 1.2  # of the drive's rate: what autotrack cannot follow
 LEAST_AHEAD_S = 2.0  # a way of a slow path, or a fast drive, takes longer than its half turn
 
 Objective = Literal["largest_error", "seconds"]
@@ -51,10 +53,14 @@ class SkyPath:
 
 @dataclass(frozen=True, slots=True)
 class KeyholeRules:
-    """What the antenna can do, and what counts as better."""
+    """What the antenna can do, and what counts as better.
+
+    may_plunge: its elevation reaches as far beyond the zenith as a pass is high before it.
+    """
 
     azimuth: AxisLimits
     max_el_deg: float = 90.0
+    may_plunge: bool = False
     half_beam_deg: float = 0.5
     objective: Objective = "largest_error"
 
@@ -67,6 +73,7 @@ class Begun:
     az_deg: float
     az_rate_deg_s: float
     now_s: float
+    plunge_to_s: float | None = None  # over the top: its return; None: it goes round
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,18 +97,49 @@ def longest_window_s(azimuth: AxisLimits) -> float:
 
 
 def follow_path(
-    path: SkyPath, rules: KeyholeRules, begun: Begun | None = None
+    path: SkyPath, rules: KeyholeRules, begun: Begun | None = None, plunged: tuple[Array, Array] | None = None
 ) -> tuple[SkyPath, ZenithCrossing | None]:
     """Give the path that the antenna can follow, and how it crosses the keyhole.
 
     The path itself, and None, where azimuth rate and acceleration lie within the drive's.  begun: the way that the
     antenna is on, or is about to go: it is gone on with, so that a path which a fit has moved makes no jump, unless
     the antenna has not departed and another way is better for sure.  Where nothing leads back onto the path before it
-    ends, it is chased.  The times of the crossing count from the path's start.
+    ends, it is chased.  The times of the crossing count from the path's start.  plunged: azimuth and elevation of the
+    same path for a plunged antenna, where one may be; where that is better than the way round, it is what is followed
+    from the zenith on.
     """
+    over = None if plunged is None else _over(path, plunged, rules, begun)
+    if over is not None and begun is not None:
+        return _followed(over, path.step_s)
     beyond = _beyond(path, rules.azimuth)
     if beyond.size == 0:
         return path, None
+    followed, crossing = _round(path, rules, begun, beyond)
+    if over is None or crossing is None or over.crossing.largest_error_deg >= crossing.largest_error_deg:
+        return followed, crossing
+    return _followed(over, path.step_s)
+
+
+def _over(path: SkyPath, plunged: tuple[Array, Array], rules: KeyholeRules, begun: Begun | None) -> Over | None:
+    """The way over the top, where the one in hand is it, or where none is in hand and autotrack cannot follow."""
+    branches = Branches(path.az_deg, path.el_deg, path.az_rate_deg_s, path.el_rate_deg_s, *plunged, path.step_s)
+    if begun is not None:
+        if begun.plunge_to_s is None:
+            return None
+        in_hand = (begun.departure_s, begun.plunge_to_s, begun.az_deg, begun.az_rate_deg_s)
+        return way_over(branches, rules.azimuth, rules.half_beam_deg, in_hand)
+    is_too_fast = float(np.abs(path.az_rate_deg_s).max()) > TAKEOVER_RATES * rules.azimuth.max_rate_deg_s
+    return way_over(branches, rules.azimuth, rules.half_beam_deg) if is_too_fast else None
+
+
+def _followed(over: Over, step_s: float) -> tuple[SkyPath, ZenithCrossing]:
+    return SkyPath(over.az_deg, over.el_deg, over.az_rate_deg_s, over.el_rate_deg_s, step_s), over.crossing
+
+
+def _round(
+    path: SkyPath, rules: KeyholeRules, begun: Begun | None, beyond: npt.NDArray[np.int64]
+) -> tuple[SkyPath, ZenithCrossing]:
+    """The way round, by a half turn of the azimuth.  beyond: the samples that the drive cannot follow."""
     fastest = int(np.argmax(np.abs(path.az_rate_deg_s)))
     by_deg = path.az_deg[min(fastest + NEAR_STEPS, path.az_deg.size - 1)] - path.az_deg[max(fastest - NEAR_STEPS, 0)]
     sign = 1.0 if by_deg >= 0.0 else -1.0  # not the rate's, where the azimuth goes the other way round

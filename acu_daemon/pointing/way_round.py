@@ -2,7 +2,7 @@
 
 Angles are the encoders', the azimuth continuous; a straight way is one in azimuth and elevation.  The sun's disc is
 passed on the side that is nearer in angle about it, a box by its corners, whichever way is shorter.  Near the zenith,
-and for an antenna that plunges, there may be no way: None, and whoever asks waits.
+and for an antenna that plunges or leans, there may be no way: None, and whoever asks waits.
 
 A way is looked at only where it crosses the box about a zone, there in steps as long as the clearance.
 """
@@ -39,7 +39,7 @@ def blocked_at(
     envelope: Envelope, here: Place, there: Place, tai_s: float, only: Zone | None = None
 ) -> tuple[Place, Zone] | None:
     """Where a straight way comes too near to a zone first, and to which; None: it is free.  only: of one zone."""
-    if max(here[1], there[1]) > 90.0:
+    if envelope.is_bent(here[1], there[1]):
         return next(_inside(envelope, here, there, 0.0, 1.0, tai_s), None)
     beam = envelope.beam_deg(*here)
     first_share, first = 2.0, None
@@ -97,7 +97,7 @@ def moved_out(envelope: Envelope, place: Place, tai_s: float) -> Place | None:
     zone = envelope.zone_at(*place, tai_s, RIM_DEG)
     if zone is None:
         return place
-    if place[1] > 90.0:
+    if envelope.is_bent(place[1]):
         return None
     allowed = (
         one
@@ -146,7 +146,7 @@ def next_aim(envelope: Envelope, here: Place, goal: Place, tai_s: float) -> Plac
     if blocked is None:
         return goal
     place, zone = blocked
-    if max(here[1], goal[1]) > 90.0:
+    if envelope.is_bent(here[1], goal[1]):
         return None
     if isinstance(zone, Disc):
         return _around_disc(envelope, zone, here, goal, tai_s)

@@ -28,7 +28,7 @@ from acu_daemon.drivers.sa3842.messages import (
 )
 from acu_daemon.sim.acu_modes import Modes
 from acu_daemon.sim.acu_status import flags_of, status_of
-from acu_daemon.sim.antenna import TILT, SimulatedAntenna
+from acu_daemon.sim.antenna import SimulatedAntenna
 from acu_daemon.sim.command_registers import CommandRegisters, turns_within
 from acu_daemon.sim.faults import WATCHDOG_BIT, FaultMemory, FaultNibble
 from acu_daemon.sim.parameters import Parameters
@@ -53,7 +53,7 @@ class FakeAcu:
         self.reply_latency_s = parts.scenario.acu.reply_latency_s
         self.observer: Callable[[TraceRow], None] | None = None
         self.on_write: Callable[[RegisterWrite], None] | None = None
-        self._has_tilt = parts.scenario.acu.has_tilt
+        self._has_tilt = parts.scenario.acu.has_tilt or parts.tilt is not None
         self.is_powered = True
         self._antenna = SimulatedAntenna(parts)
         self._tick = 0
@@ -177,12 +177,12 @@ class FakeAcu:
         return Ack()
 
     def _write(self, az_deg: float, el_deg: float, tilt_code: int | None) -> Reply:
-        limits = self.parts.elevation
+        limits, tilt = self.parts.elevation, self.antenna.tilt.limits
         if not limits.min_deg - _SLACK_DEG <= el_deg <= limits.max_deg + _SLACK_DEG:
             return Nak()
         if not turns_within(az_deg, self.parts.azimuth):
             return Nak()
-        if tilt_code is not None and not TILT.min_deg <= elevation_deg(tilt_code) <= TILT.max_deg:
+        if tilt_code is not None and not tilt.min_deg <= elevation_deg(tilt_code) <= tilt.max_deg:
             return Nak()
         self._registers.write(az_deg, el_deg, tilt_code)
         self._modes.are_registers_written = True

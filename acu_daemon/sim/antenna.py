@@ -1,8 +1,8 @@
 """SIMULATION of everything that moves and hears: axes, encoders, autotrack loop, receiver, under the sky.
 
 Angles of the axes are those of the encoder, azimuth continuous; the beam points where a pedestal with the scenario's
-faults has it then (mount_axes.py), and the satellite is where it appears.  The tilt axis moves, but does not turn the
-beam.
+faults has it then (mount_axes.py), and the satellite is where it appears.  A tilt leans the pedestal (tilt_axis.py)
+where the station has one; else it moves, but does not turn the beam.
 """
 
 from dataclasses import dataclass
@@ -21,6 +21,7 @@ from acu_daemon.sim.parts import AcuParts
 from acu_daemon.sim.pedestal import STEP_S, Axis, Follower
 from acu_daemon.sim.receiver import Offset, Receiver, ReceiverSettings, offset_in_beam
 from acu_daemon.sim.sky import Direction
+from acu_daemon.sim.tilt_axis import leant
 
 TILT = AxisLimits(-15.0, 15.0, 0.5, 0.5)
 STOW_AZ_DEG = 0.0  # or the nearest limit; elevation: the upper one
@@ -69,7 +70,8 @@ class SimulatedAntenna:
         scenario, choice = parts.scenario, parts.scenario.receiver
         self.az = Axis(parts.azimuth, scenario.acu.azimuth_deg)
         self.el = Axis(parts.elevation, scenario.acu.elevation_deg)
-        self.tilt = Axis(TILT, 0.0)
+        self._leans_to_deg = None if parts.tilt is None else parts.tilt[1]
+        self.tilt = Axis(TILT if parts.tilt is None else parts.tilt[0], 0.0)
         self.receiver = Receiver(
             ReceiverSettings(parts.beamwidth_deg, choice.peak_agc_db, choice.agc_noise_db, choice.tracking_noise_deg),
             Random(f"{parts.seed} receiver"),
@@ -110,20 +112,35 @@ class SimulatedAntenna:
 
     @property
     def boresight_deg(self) -> tuple[float, float]:
-        """True azimuth (of any turn) and elevation of the beam, apparent: where what it hears appears."""
+        """True azimuth (of any turn) and elevation of the beam, apparent: where what it hears appears.
+
+        Of a dish that is raised beyond the zenith they are its own, the elevation over 90 deg.
+        """
+        az_deg, el_deg = self._pedestal_beam_deg
+        return (az_deg, el_deg) if self._leans_to_deg is None else self._leant(az_deg, el_deg, self.tilt.angle_deg)
+
+    def _leant(self, az_deg: float, el_deg: float, tilt_deg: float) -> tuple[float, float]:
+        return leant(az_deg, el_deg, tilt_deg, self._leans_to_deg or 0.0)
+
+    @property
+    def _pedestal_beam_deg(self) -> tuple[float, float]:
+        """The beam's direction as the pedestal stands, a tilt left out."""
         trouble = self.trouble
         az_deg = self.az.angle_deg - self._zero_deg[0] - trouble.slip_az_deg
         el_deg = self.el.angle_deg - self._zero_deg[1] - trouble.slip_el_deg
         if trouble.play_deg != (0.0, 0.0):
             az_deg, el_deg = trouble.beam_deg(az_deg, el_deg)
-        return (az_deg, el_deg) if self._mount is None else self._mount.beam_deg(az_deg, el_deg)
+        if self._mount is None:
+            return az_deg, el_deg
+        beam_az_deg, beam_el_deg = self._mount.beam_deg(az_deg, el_deg)
+        return (beam_az_deg + 180.0, 180.0 - beam_el_deg) if el_deg > 90.0 else (beam_az_deg, beam_el_deg)
 
     def reading_deg(self, part_s: float) -> tuple[float, float]:
         """Azimuth (continuous) and elevation as the encoders show them, with noise, part_s after the last step."""
         az_deg, el_deg = self.az.angle_after_deg(part_s), self.el.angle_after_deg(part_s)
         if noise_deg := self._scenario.encoder.noise_deg:
             gauss = self._encoder_random.gauss
-            az_deg += gauss(0.0, noise_deg) / max(cos(radians(el_deg)), _LEAST_COS_EL)
+            az_deg += gauss(0.0, noise_deg) / max(abs(cos(radians(el_deg))), _LEAST_COS_EL)
             el_deg += gauss(0.0, noise_deg)
         frozen_az_deg, frozen_el_deg = self.trouble.frozen_az_deg, self.trouble.frozen_el_deg
         return (
@@ -159,16 +176,22 @@ class SimulatedAntenna:
                 is_connected &= loss.cause != "receiver"
         self.direction, self.offset = self._sky.direction(tai_s), None
         if self.direction is not None:
-            self.offset = offset_in_beam(self.direction[0], self.direction[1], *self.boresight_deg)
+            self.offset = self._offset_of(self.direction[0], self.direction[1])
             if self._skyline is not None:
                 is_silent |= self.direction[1] < float(self._skyline.heights_deg(np.array(self.direction[0])))
         heard = None if is_silent else self.offset
         if self.trouble.carrier_deg is not None:
-            heard = offset_in_beam(*self.trouble.carrier_deg, *self.boresight_deg)
+            heard = self._offset_of(*self.trouble.carrier_deg)
         self._heard = heard
         self.has_signal = self.offset is not None and not is_silent and is_connected
         self.receiver.is_valid = is_connected
         self.receiver.sense(None if heard is None else heard.angle_deg, fade_db, threshold_db)
+
+    def _offset_of(self, az_deg: float, el_deg: float) -> Offset:
+        """Where a direction stands in the beam, right and up as the pedestal has them."""
+        if self._leans_to_deg is not None:
+            az_deg, el_deg = self._leant(az_deg, el_deg, -self.tilt.angle_deg)
+        return offset_in_beam(az_deg, el_deg, *self._pedestal_beam_deg)
 
     def _begins(self, drive: Drive) -> bool:
         begins = self._driven_by is not drive

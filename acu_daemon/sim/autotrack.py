@@ -1,6 +1,6 @@
 """SIMULATION of the autotrack loop: drives the axes by the offset the receiver measures, and remembers the rates."""
 
-from math import cos, radians
+from math import copysign, cos, radians
 
 from acu_daemon.sim.pedestal import BRAKING_SHARE, STEP_S, Axis, approach_rate_deg_s
 from acu_daemon.sim.receiver import Offset
@@ -68,5 +68,6 @@ class Autotrack:
             tracker.coast()
 
     def _axis_offsets_deg(self, measured: Offset) -> tuple[float, float]:
-        cos_el = max(cos(radians(self._elevation.angle_deg)), _LEAST_COS_EL)
+        cos_el = cos(radians(self._elevation.angle_deg))  # beyond the zenith the azimuth turns the beam the other way
+        cos_el = copysign(max(abs(cos_el), _LEAST_COS_EL), cos_el)
         return measured.right_deg / cos_el, measured.up_deg

@@ -58,8 +58,10 @@ def build_fake_acu(
     station_air: Air | None = None,
     seed: int = 0,
     address: int = DEFAULT_ADDRESS,
+    tilt: tuple[AxisLimits, float] | None = None,
 ) -> FakeAcu:
     """Build a fake ACU.  UsageError: the scenario or the truth file cannot be used."""
     chosen = Scenario() if scenario is None else read_scenario(scenario)
     sky = make_sky(propagator, site, chosen, truth, station_air=station_air, seed=seed)
-    return FakeAcu(AcuParts(azimuth, elevation, beamwidth_deg, sky, start_tai_s, chosen, seed, address, site.skyline))
+    parts = AcuParts(azimuth, elevation, beamwidth_deg, sky, start_tai_s, chosen, seed, address, site.skyline, tilt)
+    return FakeAcu(parts)

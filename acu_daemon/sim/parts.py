@@ -21,3 +21,4 @@ class AcuParts:
     seed: int = 0
     address: int = DEFAULT_ADDRESS
     skyline: Horizon | None = None  # behind which nothing is heard
+    tilt: tuple[AxisLimits, float] | None = None  # a tilt that leans the pedestal, and towards which azimuth

@@ -9,7 +9,7 @@ from acu_daemon.assist.estimators.known_bias import without_bias
 from acu_daemon.assist.reading_gate import ReadingGate, Rejected
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.assist.spaced_times import spaced
-from acu_daemon.model import AngleBias, Correction, FitResult, Readings, Site, sky_angle_deg
+from acu_daemon.model import AngleBias, Correction, FitResult, Readings, Site, plunged_bias, sky_angle_deg
 from acu_daemon.orbit.frames import station_itrs_m, teme_from_itrs
 from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.propagator import Propagator
@@ -68,7 +68,22 @@ class BaseEstimator(ABC):
 
     def _geometric(self, readings: Readings) -> Readings:
         """Readings without air and mount; how far away the satellite is, which matters little, the source says."""
-        antenna, bias = self._site.antenna, self._settings.known_bias
+        was_plunged = readings.el_deg > 90.0
+        if not bool(was_plunged.any()):
+            return self._without(readings, self._settings.known_bias)
+        bias = self._settings.known_bias
+        here, beyond = self._without(readings, bias), self._without(readings, plunged_bias(bias))
+        az_deg, el_deg = (
+            np.where(was_plunged, getattr(beyond, name), getattr(here, name)) for name in ("az_deg", "el_deg")
+        )
+        return replace(readings, az_deg=az_deg, el_deg=el_deg, was_plunged=was_plunged)
+
+    def _without(self, readings: Readings, bias: AngleBias) -> Readings:
+        antenna, is_plunged = self._site.antenna, readings.el_deg > 90.0
+        if antenna is None and bool(is_plunged.any()):
+            az_deg = np.where(is_plunged, readings.az_deg + 180.0, readings.az_deg) % 360.0
+            el_deg = np.where(is_plunged, 180.0 - readings.el_deg, readings.el_deg)
+            readings = replace(readings, az_deg=az_deg, el_deg=el_deg)
         if antenna is None and bias == AngleBias():
             return readings
         few = spaced(readings.tai_s, _RANGE_STEP_S)

@@ -1,5 +1,6 @@
 """Readings against a predicted path: how far off, and how far off may be.  Pure."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -8,7 +9,7 @@ import numpy.typing as npt
 from acu_daemon.assist.mount_model import encoder_look, sigma_deg
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import FitResult, Readings, Site
-from acu_daemon.orbit.look import Look, look_along
+from acu_daemon.orbit.look import Look, look_along, look_at
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import Array, wrap_180_array
 
@@ -63,7 +64,7 @@ def offsets(
     Raises:  OrbitError: the source has no answer for one of the times.
     """
     propagator = propagator_of(source, fit)
-    right_deg, up_deg = _on_the_sky(readings, encoder_look(propagator, readings.tai_s, site, fit, look_along))
+    right_deg, up_deg = _beside(propagator, site, fit, readings, look_along)
     noise_deg = max(settings.sigma_azimuth_deg, settings.sigma_elevation_deg)
     least_deg = NEAR_BEAMS * settings.beamwidth_deg
     near_deg = np.full(len(readings), max(least_deg, NEAR_SIGMAS * noise_deg))
@@ -81,7 +82,7 @@ def angles_deg(source: Propagator, site: Site, fit: FitResult | None, readings: 
 
     Raises:  OrbitError: the source has no answer for one of the times.
     """
-    angle: Array = np.hypot(*_on_the_sky(readings, encoder_look(propagator_of(source, fit), readings.tai_s, site, fit)))
+    angle: Array = np.hypot(*_beside(propagator_of(source, fit), site, fit, readings, look_at))
     return angle
 
 
@@ -90,7 +91,20 @@ def propagator_of(source: Propagator, fit: FitResult | None) -> Propagator:
     return source if fit is None else source.corrected(fit.correction)
 
 
+def _beside(
+    propagator: Propagator, site: Site, fit: FitResult | None, readings: Readings, look: Callable[..., Look]
+) -> tuple[Array, Array]:
+    """Readings minus path, right and up; those of a plunged antenna are compared with the path as it has that."""
+    what = (propagator, readings.tai_s, site, fit, look)
+    is_plunged = readings.el_deg > 90.0
+    right_deg, up_deg = _on_the_sky(readings, encoder_look(*what))
+    if not bool(is_plunged.any()):
+        return right_deg, up_deg
+    beyond_right_deg, beyond_up_deg = _on_the_sky(readings, encoder_look(*what, is_plunged=True))
+    return np.where(is_plunged, beyond_right_deg, right_deg), np.where(is_plunged, -beyond_up_deg, up_deg)
+
+
 def _on_the_sky(readings: Readings, path: Look) -> tuple[Array, Array]:
     """Readings minus path, right and up."""
-    cos_el = np.maximum(np.cos(np.radians(path.el_deg)), LEAST_COS_EL)
+    cos_el = np.maximum(np.abs(np.cos(np.radians(path.el_deg))), LEAST_COS_EL)
     return wrap_180_array(readings.az_deg - path.az_deg) * cos_el, readings.el_deg - path.el_deg

@@ -35,6 +35,7 @@ class RefitSetup:
 
     carried: what an earlier pass left and was accepted, which only estimators with a covariance use; or
     the fit of this pass that the daemon had when it was started again: it goes on from it.
+    may_plunge: the elevation axis goes over the top, and the antenna may be led so.
     memory: what the station knows of its antenna; None: no such thing is kept, the configuration says it all.
     """
 
@@ -47,13 +48,14 @@ class RefitSetup:
     carried: CarryOver | None = None
     zenith_objective: Objective = "largest_error"
     memory: PedestalMemory | None = None
+    may_plunge: bool = False
 
     @property
     def keyhole(self) -> KeyholeRules:
         """What the antenna can do near the zenith."""
         max_el_deg = 90.0 if self.settings.elevation is None else min(self.settings.elevation.max_deg, 90.0)
         half_beam_deg = self.settings.beamwidth_deg / 2.0
-        return KeyholeRules(self.azimuth, max_el_deg, half_beam_deg, self.zenith_objective)
+        return KeyholeRules(self.azimuth, max_el_deg, self.may_plunge, half_beam_deg, self.zenith_objective)
 
     @property
     def is_resumed(self) -> bool:
@@ -72,6 +74,8 @@ class RefitRequest:
     near_az_deg: float  # picks the turn of the azimuth at the start of the buffer
     zenith_turn: int = 0  # past the zenith the azimuth rises (1), falls (-1), or as the path does
     in_hand: ZenithCrossing | None = None  # the crossing of the zenith that the antenna is on, or is about to begin
+    may_plunge: bool = True  # over the top, where the antenna can: the mode it is in lets it
+    is_plunged: bool = False  # it is beyond the zenith
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,10 +273,11 @@ def predict_from(setup: RefitSetup, fit: FitResult | None, request: RefitRequest
         step_s=setup.step_s,
         near_az_deg=request.near_az_deg,
         lead_in_s=longest_window_s(setup.azimuth),
-        keyhole=setup.keyhole,
+        keyhole=replace(setup.keyhole, may_plunge=setup.may_plunge and request.may_plunge),
         in_hand=request.in_hand,
         zenith_turn=request.zenith_turn,
         fit=fit,
+        is_plunged=request.is_plunged,
     )
     what = (setup.propagator, setup.site, setup.settings)
     spread = spread_of(*what, fit, prediction, request.now_tai_s)

@@ -8,6 +8,7 @@ import numpy as np
 from acu_daemon.assist.reading_gate import DWELL, Dwell
 from acu_daemon.assist.session.refit import RefitReply, RefitRequest, RefitSetup, Refitter
 from acu_daemon.model import FitResult, Reading, Readings
+from acu_daemon.pointing.plunge import PLUNGED_DEG
 
 BUFFER_S = 2.0  # after its end, and with new readings, a fresh one is made
 REFIT_PERIOD_S = 0.5  # at any rate of readings, a refit then comes at least once a second of data, or on every line
@@ -49,7 +50,7 @@ def replay(
     refitted_tai_s = -np.inf
     current: RefitReply | None = None
     left_out: dict[str, int] = {}
-    has_acquired = False
+    has_acquired = is_plunged = False
     for count, (tai_s, reading) in enumerate(lines):
         is_acquired = reading is not None and reading.is_locked
         has_acquired = has_acquired or is_acquired
@@ -57,23 +58,25 @@ def replay(
         is_loss = bool(waiting) and not is_acquired
         if current is None or tai_s > current.prediction.end_tai_s or is_due or is_loss:
             refitted_tai_s = waiting[-1].tai_s if waiting else refitted_tai_s
-            current = refitter.refit(_request(waiting, tai_s))
+            current = refitter.refit(_request(waiting, tai_s, is_plunged=is_plunged))
             waiting = []
             left_out = _left_out(current, dwell)
         yield _line(current, tai_s, (is_acquired, has_acquired), left_out)
         if reading is not None and dwell.is_locked(reading):
             waiting.append(reading)
+            is_plunged = reading.el_deg > PLUNGED_DEG
         if on_progress is not None and count % 100 == 0:
             on_progress(count)
 
 
-def _request(waiting: list[Reading], tai_s: float) -> RefitRequest:
+def _request(waiting: list[Reading], tai_s: float, *, is_plunged: bool) -> RefitRequest:
     return RefitRequest(
         readings=Readings.of(waiting),
         start_tai_s=tai_s,
         horizon_s=BUFFER_S,
         now_tai_s=tai_s,
         near_az_deg=180.0,
+        is_plunged=is_plunged,
     )
 
 

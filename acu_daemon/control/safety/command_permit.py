@@ -74,7 +74,9 @@ def _of_kind(command: Command, state: ControlState, now_tai_s: float, config: Co
     stage = reached(state.startup.stage, config)
     is_ready = stage is StartStage.READY
     match command:
-        case PointAndPoll(az_deg=az_deg, el_deg=el_deg) if is_ready:
+        case PointAndPoll(az_deg=az_deg, el_deg=el_deg, tilt_deg=tilt_deg) if is_ready:
+            if tilt_deg is not None and not _may_tilt(tilt_deg, config):
+                return "tilt outside its limits"
             return _of_write(az_deg, el_deg, state, now_tai_s, config)
         case PointAt(az_deg=az_deg, el_deg=el_deg) if stage >= StartStage.SECTOR_FREE:
             return _of_write(az_deg, el_deg, state, now_tai_s, config)
@@ -85,6 +87,10 @@ def _of_kind(command: Command, state: ControlState, now_tai_s: float, config: Co
         case FreeTurnChoice() | SetWatchdog() if stage >= StartStage.REGISTERS_KNOWN:
             return ""
     return "not in its place"
+
+
+def _may_tilt(tilt_deg: float, config: ControlConfig) -> bool:
+    return config.tilt is not None and config.tilt.min_deg <= tilt_deg <= config.tilt.max_deg
 
 
 def _of_write(az_deg: float, el_deg: float, state: ControlState, now_tai_s: float, config: ControlConfig) -> str:

@@ -22,11 +22,12 @@ class Way:
 
     azimuth_s: float
     elevation_s: float
+    tilt_s: float = 0.0
 
     @property
     def both_s(self) -> float:
         """Until both are there, modes included."""
-        return BEGIN_S + max(self.azimuth_s, self.elevation_s)
+        return BEGIN_S + max(self.azimuth_s, self.elevation_s, self.tilt_s)
 
 
 def way_s(distance_deg: float, axis: AxisLimits) -> float:
@@ -43,7 +44,14 @@ def way_to(plan: PassPlan, state: ControlState, config: ControlConfig) -> Way:
     """From where the antenna stands to the point where the pass begins, on the turn of the plan."""
     el_deg = state.intake.status.el_deg if state.intake.status is not None else plan.start_el_deg
     way_az_deg, way_el_deg = plan.start_az_deg - state.intake.az_deg, plan.start_el_deg - el_deg
-    return Way(way_s(way_az_deg, config.azimuth), way_s(way_el_deg, config.elevation))
+    return Way(way_s(way_az_deg, config.azimuth), way_s(way_el_deg, config.elevation), _tilt_s(state, config))
+
+
+def _tilt_s(state: ControlState, config: ControlConfig) -> float:
+    status = state.intake.status
+    if config.tilt is None or config.tilt_deg is None or status is None or status.tilt_deg is None:
+        return 0.0
+    return way_s(config.tilt_deg - status.tilt_deg, config.tilt)
 
 
 def lead_s(plan: PassPlan, state: ControlState, config: ControlConfig) -> float:

@@ -17,6 +17,8 @@ from acu_daemon.control.tracking.state_table import HOLDING, LED, Cause, TrackSt
 from acu_daemon.control.tracking.track_frame import extents, is_within, offset_of, three_sigma_of
 from acu_daemon.control.tracking.zone_watch import nears_zone
 from acu_daemon.model import Model, Pointing, sky_angle_deg
+from acu_daemon.pointing.keyhole import TAKEOVER_RATES
+from acu_daemon.pointing.tilt import SET_DEG
 from acu_daemon.pointing.wrap import nearest_turn
 
 ON_POINT_BEAMS = 0.25
@@ -29,7 +31,6 @@ TAKEOVER_S, GIVE_BACK_S = 2.0, 0.5  # before the departure, and after the return
 GLANCE_S = {TrackState.ACQUIRE_TLE: 3.0, TrackState.HOLD_TLE: 10.0}
 LEAVING_S = 15.0  # after a false lock; then autotrack is selected wherever the antenna is
 CHANGED_S = 3.0  # by which a fit may put off a crossing that the antenna was taken over for
-TAKEOVER_RATES = 1.2  # of the drive's rate: what autotrack cannot follow
 MODE_SETTLE_S = 3.0  # a selected mode takes a moment to show; only later is a left mode the ACU's own doing
 
 
@@ -100,9 +101,13 @@ def _of_zenith(state: ControlState, given: TickInput, config: ControlConfig) -> 
         return set() if begin_tai_s - CHANGED_S <= now_tai_s < end_tai_s else {past}
     if crossing is None or not begin_tai_s <= now_tai_s < end_tai_s - 2.0 * GIVE_BACK_S:
         return set()
-    may_take = config.zenith_takeover == "always" or (config.zenith_takeover == "fitted" and sky.is_fitted)
     is_too_fast = crossing.peak_rate_deg_s > TAKEOVER_RATES * config.azimuth.max_rate_deg_s
-    return {Cause.ZENITH_NEAR} if may_take and is_too_fast else set()
+    return {Cause.ZENITH_NEAR} if may_lead_past_zenith(sky, config) and is_too_fast else set()
+
+
+def may_lead_past_zenith(sky: Sky, config: ControlConfig) -> bool:
+    """Whether autotrack may be left for the way past the zenith."""
+    return config.zenith_takeover == "always" or (config.zenith_takeover == "fitted" and sky.is_fitted)
 
 
 def _of_others(state: ControlState, status: AcuStatus, given: TickInput, config: ControlConfig) -> set[Cause]:
@@ -135,7 +140,7 @@ def _of_signal(state: ControlState, status: AcuStatus, given: TickInput, config:
     if not config.has_signal:
         return causes
     if is_acquired(status):
-        if _is_ours(state, status, given, config):
+        if is_tilt_set(status, config) and _is_ours(state, status, given, config):
             causes.add(Cause.ACQUIRED_FITTED if sky.is_fitted else Cause.ACQUIRED)
         if sky.is_fitted and state.tracking.track is TrackState.HOLD_FITTED:
             causes.add(Cause.ACQUIRED)
@@ -172,7 +177,8 @@ def _of_plan(state: ControlState, status: AcuStatus, given: TickInput, config: C
     causes: set[Cause] = set()
     if sky.prediction is not None and now_tai_s >= plan.rise_tai_s - lead_s(plan, state, config):
         causes.add(Cause.PASS_NEAR)
-    if state.tracking.track in BEFORE and now_tai_s >= plan.rise_tai_s - ACQUIRE_LEAD_S:
+    is_set = is_tilt_set(status, config)
+    if is_set and state.tracking.track in BEFORE and now_tai_s >= plan.rise_tai_s - ACQUIRE_LEAD_S:
         target = path_point(sky, now_tai_s)
         if target is not None and target.is_finite:
             is_in_pass = now_tai_s >= plan.rise_tai_s
@@ -211,6 +217,15 @@ def _of_place(
         if status.is_autotrack_selected and status.follows_registers:
             causes.add(Cause.STILL_SELECTED)
     return causes
+
+
+def is_tilt_set(status: AcuStatus, config: ControlConfig) -> bool:
+    """Whether the pedestal leans as this pass asks, by what the ACU reads, and stands still: else no path is true."""
+    if config.tilt_deg is None:
+        return True
+    return (
+        status.tilt_deg is not None and not status.is_tilt_moving and abs(status.tilt_deg - config.tilt_deg) <= SET_DEG
+    )
 
 
 def path_point(sky: Sky, tai_s: float, *, follow: bool = True) -> Pointing | None:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from acu_daemon.assist.mount_model import encoder_look
 from acu_daemon.assist.session.prediction import predict
 from acu_daemon.control.tick_input import PassPlan
 from acu_daemon.model import Site
@@ -58,7 +59,8 @@ def expected_way(
     azimuth, elevation = envelope.azimuth, envelope.elevation
     antenna_az = np.clip(buffer.follow_az_deg + turned_deg, azimuth.min_deg, azimuth.max_deg)
     antenna_el = np.clip(followed_el, elevation.min_deg, elevation.max_deg)
-    off_deg = _apart_deg(antenna_az, antenna_el, buffer.az_deg, buffer.el_deg)
+    seen = encoder_look(propagator, tai_s, site, None)
+    off_deg = _apart_deg(antenna_az, antenna_el, seen.az_deg, seen.el_deg)
     return ExpectedWay(tai_s, buffer.az_deg, buffer.el_deg, antenna_az, antenna_el, off_deg)
 
 

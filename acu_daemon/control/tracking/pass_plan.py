@@ -1,5 +1,6 @@
 """The plan of a pass: where to stand, on which turn of the wrap, when it is due, and when the pass ends.  Pure."""
 
+from dataclasses import dataclass
 from functools import partial
 from math import isfinite
 
@@ -13,7 +14,10 @@ from acu_daemon.control.tracking.approach import ACQUIRE_LEAD_S, way_s
 from acu_daemon.control.tracking.state_table import AUTOTRACKING, TrackState
 from acu_daemon.model import AxisLimits, Pass, Site, ZenithCrossing
 from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.pointing.envelope import Envelope
 from acu_daemon.pointing.keyhole import KeyholeRules, longest_window_s, turned_past_zenith
+from acu_daemon.pointing.outage import KeptOut, SunOutage, kept_out, sun_outages
+from acu_daemon.pointing.plunge import PLUNGED_DEG
 from acu_daemon.pointing.reach import OutOfReach, out_of_reach
 from acu_daemon.pointing.turn_plan import TurnAsk, TurnPlan, plan_turns
 from acu_daemon.pointing.wrap import choose_turn, judged, middle_deg
@@ -24,7 +28,47 @@ STEERED = AUTOTRACKING | {TrackState.PROGRAM}
 COARSE_STEP_S, MOST_STEPS = 0.5, 20000  # of these a tenth of a second's work, in the loop
 ANY_ELEVATION = AxisLimits(-90.0, 180.0, 1.0, 1.0)
 LEAST_KEYHOLE_EL_DEG, MOST_AROUND_S = 60.0, 400.0  # lower, and slower, no drive crosses the zenith in a window
+OVER_S = 15.0  # about the zenith a plunging antenna's azimuth does not follow the path's
 STEP_S = 0.25  # fine enough to unwrap the azimuth of a pass 0.1 deg from the zenith
+
+
+@dataclass(frozen=True, slots=True)
+class PlanRequest:
+    """What a pass is planned from, beside its orbit and site; fields as the arguments of `plan_pass`."""
+
+    coming: Pass
+    present_az_deg: float
+    present_el_deg: float
+    envelope: Envelope
+    now_tai_s: float
+    learned_count: int
+    keyhole: KeyholeRules
+
+
+@dataclass(frozen=True, slots=True)
+class PlanAnswer:
+    """A plan, and what people should know of the pass beside it."""
+
+    plan: PassPlan
+    sun: tuple[SunOutage, ...] = ()
+    keep_outs: tuple[KeptOut, ...] = ()
+
+
+def planned_pass(propagator: Propagator, site: Site, asked: PlanRequest) -> PlanAnswer:
+    """Plan a pass and look at what is in its way: all that the fit process is asked for before a pass.
+
+    Raises: OrbitError: the propagator has no answer for a time of the pass.
+    """
+    envelope, coming = asked.envelope, asked.coming
+    plan = plan_pass(
+        *(propagator, site, coming, asked.present_az_deg, envelope.azimuth, asked.now_tai_s),
+        elevation=envelope.elevation,
+        learned_count=asked.learned_count,
+        keyhole=asked.keyhole,
+        present_el_deg=asked.present_el_deg,
+    )
+    sun = sun_outages(propagator, site, envelope.sun, coming)
+    return PlanAnswer(plan, sun, kept_out(propagator, site, envelope.keep_outs, coming))
 
 
 def plan_pass(
@@ -38,6 +82,7 @@ def plan_pass(
     elevation: AxisLimits = ANY_ELEVATION,
     learned_count: int = 0,
     keyhole: KeyholeRules | None = None,
+    present_el_deg: float = 0.0,
 ) -> PassPlan:
     """Choose the turns that cost least of what is left of the pass, and the point where the antenna waits for it.
 
@@ -48,8 +93,10 @@ def plan_pass(
     start_tai_s = min(max(coming.rise_tai_s, now_tai_s), coming.set_tai_s - 1.0)
     step_s = max(STEP_S, (coming.set_tai_s - start_tai_s) / MOST_STEPS)  # one that does not set lasts for days
     tai_s = np.arange(start_tai_s, coming.set_tai_s + step_s, step_s)
-    look = encoder_look(propagator, tai_s, site, None)
-    az_deg = np.degrees(np.unwrap(np.radians(look.az_deg)))
+    is_past_top = start_tai_s >= coming.culmination_tai_s
+    is_plunged = keyhole is not None and keyhole.may_plunge and is_past_top and present_el_deg > PLUNGED_DEG
+    look = encoder_look(propagator, tai_s, site, None, is_plunged=is_plunged)
+    az_deg, el_deg = np.degrees(np.unwrap(np.radians(look.az_deg))), look.el_deg
     is_seen = np.ones(tai_s.size, dtype=np.bool_)
     for from_tai_s, to_tai_s in coming.hidden_tai_s:
         is_seen &= (tai_s < from_tai_s) | (tai_s > to_tai_s)
@@ -60,7 +107,7 @@ def plan_pass(
             TurnAsk(
                 *ask,
                 way_s=partial(way_s, axis=azimuth),
-                is_either_way=lambda offset_deg: judged(offset_deg, az_deg, look.el_deg, azimuth).holds_either_way,
+                is_either_way=lambda offset_deg: judged(offset_deg, az_deg, el_deg, azimuth).holds_either_way,
             )
         )
 
@@ -69,7 +116,11 @@ def plan_pass(
 
     turns, zenith_turn = on_turns(az_deg), 0
     crossing = crossing_of(az_deg + turns.offset_deg, 0)
-    if turns.unwindings and crossing is not None:
+    if crossing is not None and crossing.is_plunge:
+        az_deg, el_deg = _beyond_top(propagator, tai_s, site, az_deg, el_deg)
+        turns = on_turns(az_deg)
+        crossing = crossing_of(az_deg + turns.offset_deg, 0)
+    elif turns.unwindings and crossing is not None:
         rising = 1 if az_deg[-1] > az_deg[0] else -1
         other_az_deg = turned_past_zenith(az_deg, np.gradient(az_deg, step_s), -rising)
         is_crossing = (tai_s > crossing.departure_tai_s) & (tai_s < crossing.return_tai_s)
@@ -78,21 +129,33 @@ def plan_pass(
         other = crossing_of(other_az_deg + others.offset_deg, -rising)
         if not others.unwindings and other is not None and other.lost_s < crossing.lost_s + turns.unwinding_s:
             turns, zenith_turn, crossing, az_deg = others, -rising, other, other_az_deg
-    turn = judged(turns.offset_deg, az_deg, look.el_deg, azimuth)
+    turn = judged(turns.offset_deg, az_deg, el_deg, azimuth)
     return PassPlan(
         rise_tai_s=coming.rise_tai_s,
         set_tai_s=coming.set_tai_s,
         start_tai_s=start_tai_s,
         start_az_deg=float(az_deg[0]) + turn.offset_deg,
-        start_el_deg=float(look.el_deg[0]),
+        start_el_deg=float(el_deg[0]),
         note="" if turn.holds_path else turn.reason,
-        beyond=out_of_reach(tai_s, az_deg + turn.offset_deg, look.el_deg, azimuth, elevation),
+        beyond=out_of_reach(tai_s, az_deg + turn.offset_deg, el_deg, azimuth, elevation),
         learned_count=learned_count,
         hidden_tai_s=coming.hidden_tai_s,
         unwindings=turns.unwindings,
         crossing=crossing,
         zenith_turn=zenith_turn,
+        is_plunged=is_plunged,
     )
+
+
+def _beyond_top(propagator: Propagator, tai_s: Array, site: Site, az_deg: Array, el_deg: Array) -> tuple[Array, Array]:
+    """A path that is flown over the top: plunged from there on, its azimuth as it was before."""
+    seen = encoder_look(propagator, tai_s, site, None, is_plunged=True)
+    top = int(np.argmax(el_deg))
+    plunged_deg = seen.az_deg[top:] + 360.0 * np.round((az_deg[0] - seen.az_deg[top:]) / 360.0)
+    azimuth = np.concatenate((az_deg[:top], plunged_deg))
+    middle = (tai_s > tai_s[top] - OVER_S) & (tai_s < tai_s[top] + OVER_S) & (tai_s > tai_s[0]) & (tai_s < tai_s[-1])
+    azimuth[middle] = np.interp(tai_s[middle], tai_s[~middle], azimuth[~middle])
+    return azimuth, np.concatenate((el_deg[:top], seen.el_deg[top:]))
 
 
 def _crossing(

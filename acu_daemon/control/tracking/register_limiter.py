@@ -68,7 +68,7 @@ def limit(
     )
     if is_followed:
         half_beam_deg = config.beamwidth_deg / 2
-        half_beam_az_deg = half_beam_deg / max(cos(radians(wanted.el_deg)), LEAST_COS_EL)
+        half_beam_az_deg = half_beam_deg / max(abs(cos(radians(wanted.el_deg))), LEAST_COS_EL)
         antenna_az, antenna_el = _antenna(state, now_tai_s)
         new_az = _reachable(az, _waiting(az, antenna_az, new_az), dt_s, azimuth, half_beam_az_deg)
         new_el = _reachable(el, _waiting(el, antenna_el, new_el), dt_s, elevation, half_beam_deg)

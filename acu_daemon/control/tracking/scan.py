@@ -10,7 +10,8 @@ and drives allow, and only while the antenna is where it was told; what counts a
 it saw.  Where the mask or a limit is in the way a side waits, and another is looked at meanwhile.
 
 What must be covered comes in parts: first what lies within both the keys and 3 sigma of the prediction, then what the
-keys say, then the rest of the 3 sigma.
+keys say, then the rest of the 3 sigma.  Where the keys end before 2 sigma along the track, three rows about it go
+beyond them before all else, by a third as much again at most: elements are wrong along the track more than across it.
 """
 
 from collections.abc import Iterator
@@ -19,7 +20,7 @@ from math import ceil, cos, hypot, radians
 
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.state import Scan
-from acu_daemon.control.tracking.track_frame import beside, extents, offset_of, three_sigma_of
+from acu_daemon.control.tracking.track_frame import SIGMAS, beside, extents, offset_of, three_sigma_of
 from acu_daemon.model import AxisLimits, Pointing, Prediction, Reading
 from acu_daemon.pointing.wrap import nearest_turn
 
@@ -33,6 +34,7 @@ STEP_SHARE = 0.5  # of the extent along the track: the row on the path grows by 
 ENDS_S = 0.05  # nearer to its end than this a row is covered
 SLOWEST_DEG_S, LEAST_PACE = 0.005, 1e-3
 LEAST_ALONG_S = 1.0  # a row's length to each side
+LIKELY_SIGMAS, MOST_OF_KEYS = 2.0, 1.3  # along the track: three rows about it go so far first, beyond the keys
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,13 +57,15 @@ def row_deg(config: ControlConfig) -> float:
     return ROW_BEAMS * config.beamwidth_deg
 
 
-def boxes(prediction: Prediction | None, config: ControlConfig) -> tuple[Box, Box, Box]:
-    """What keys and covariance both say, what the keys say, and what either says."""
+def boxes(prediction: Prediction | None, config: ControlConfig) -> tuple[Box, ...]:
+    """What keys and covariance both say, what the keys say, and what either says; before them a longer track."""
     keys, most = (config.search_along_s, config.search_across_deg), extents(prediction, config)
     three_sigma = three_sigma_of(prediction) or keys
     least = (max(min(three_sigma[0], keys[0]), LEAST_ALONG_S), min(three_sigma[1], keys[1]))
     first, second, third = (Box(along_s, _row_count(across_deg, config)) for along_s, across_deg in (least, keys, most))
-    return first, second, third
+    likely_s = min(LIKELY_SIGMAS / SIGMAS * three_sigma[0], MOST_OF_KEYS * first.along_s)
+    track = (Box(likely_s, min(1, first.row_count)),) if likely_s > first.along_s else ()
+    return *track, first, second, third
 
 
 def _row_count(across_deg: float, config: ControlConfig) -> int:
@@ -239,7 +243,7 @@ def needed_s(scan: Scan, prediction: Prediction, tai_s: float, config: ControlCo
     """About how long the rest takes at the present pace, ways between left out: of what the keys say, and of all."""
     on_path = Scan(side=-1)
     pace = max(pace_s_s(on_path, prediction, tai_s, config), LEAST_PACE)
-    _, keys, whole = boxes(prediction, config)
+    keys, whole = boxes(prediction, config)[-2:]
     return _open_s(scan, (keys,)) / pace, _open_s(scan, (keys, whole)) / pace
 
 

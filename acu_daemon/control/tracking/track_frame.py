@@ -77,7 +77,7 @@ def _motion(point: Pointing) -> tuple[float, float, float]:
 
 
 def _moved(az_deg: float, el_deg: float, right_deg: float, up_deg: float) -> tuple[float, float]:
-    """Go along a great circle; the azimuth stays continuous."""
+    """Go along a great circle; the azimuth stays continuous, and a plunged antenna plunged."""
     angle_deg = hypot(right_deg, up_deg)
     if angle_deg == 0.0:
         return az_deg, el_deg
@@ -85,7 +85,10 @@ def _moved(az_deg: float, el_deg: float, right_deg: float, up_deg: float) -> tup
     right, up = sin(far) * right_deg / angle_deg, sin(far) * up_deg / angle_deg
     forward = cos(el) * cos(far) - sin(el) * up
     high = sin(el) * cos(far) + cos(el) * up
-    return az_deg + degrees(atan2(right, forward)), degrees(asin(min(1.0, max(-1.0, high))))
+    high_deg = degrees(asin(min(1.0, max(-1.0, high))))
+    if el_deg > 90.0:
+        return az_deg + degrees(atan2(-right, -forward)), 180.0 - high_deg
+    return az_deg + degrees(atan2(right, forward)), high_deg
 
 
 def offset_of(prediction: Prediction, tai_s: float, az_deg: float, el_deg: float) -> tuple[float, float] | None:

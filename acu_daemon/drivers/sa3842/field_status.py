@@ -18,6 +18,7 @@ _SHARED = {field.name for field in fields(AcuStatus)} & {field.name for field in
     "az_deg",
     "el_deg",
     "agc_db",
+    "tilt_deg",
 }
 
 
@@ -30,13 +31,20 @@ def read_field_status(text: str) -> AcuStatus:
         az_deg=azimuth_deg(code >> 44),
         el_deg=elevation_deg(code >> 28 & 0xFFFF),
         agc_db=(code & 0xFFF) * AGC_LSB_DB,
+        tilt_deg=elevation_deg(code >> 12 & 0xFFFF) if _is_tilt_fitted(text[15:]) else None,
         **flags,
     )
 
 
 def field_status(status: Status) -> AcuStatus:
     """The same of a status that was read."""
-    return AcuStatus(status.az_deg, status.el_deg, agc_db=status.agc_db, **_flags_of(status))
+    tilt_deg = status.tilt_deg if status.is_tilt_fitted else None
+    return AcuStatus(status.az_deg, status.el_deg, agc_db=status.agc_db, tilt_deg=tilt_deg, **_flags_of(status))
+
+
+@lru_cache(maxsize=64)
+def _is_tilt_fitted(text: str) -> bool:
+    return bool(decode_flags(text)["is_tilt_fitted"])
 
 
 @lru_cache(maxsize=64)

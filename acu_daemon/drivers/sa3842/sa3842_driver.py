@@ -25,7 +25,7 @@ from acu_daemon.acu.replies import (
     WatchdogTime,
 )
 from acu_daemon.drivers.sa3842 import messages as wire
-from acu_daemon.drivers.sa3842.angles import LSB_DEG
+from acu_daemon.drivers.sa3842.angles import LSB_DEG, elevation_code
 from acu_daemon.drivers.sa3842.codec import DEFAULT_ADDRESS, exchange_bytes
 from acu_daemon.drivers.sa3842.exchange import HostExchange
 from acu_daemon.drivers.sa3842.field_status import field_status, read_field_status
@@ -43,7 +43,7 @@ SA3842 = Capabilities(angle_step_deg=LSB_DEG, watchdog_step_s=WATCHDOG_LSB_S)
 class Sa3842Driver:
     """The host's side of the dialogue in field words; `HostExchange` has its rules.
 
-    Remembers the tilt register, which every write gives back as it was read.
+    Remembers the tilt register, which a write that says nothing of the tilt gives back as it was read.
     """
 
     capabilities = SA3842
@@ -135,8 +135,8 @@ class Sa3842Driver:
 def wire_command(command: Command, tilt_code: int = 0) -> wire.Command:
     """The SA-3842's own command for one in field words."""
     match command:
-        case PointAndPoll(az_deg, el_deg):
-            return wire.WriteAndPoll(az_deg, el_deg, tilt_code)
+        case PointAndPoll(az_deg, el_deg, tilt_deg):
+            return wire.WriteAndPoll(az_deg, el_deg, tilt_code if tilt_deg is None else elevation_code(tilt_deg))
         case PointAt(az_deg, el_deg):
             return wire.WriteRegisters(az_deg, el_deg)
         case ReadCommanded():

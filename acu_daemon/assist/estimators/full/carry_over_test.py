@@ -58,7 +58,7 @@ class CarryOverTest:
         left = residuals(path, here, prior.mean, self._settings, seen)
         noise = np.square(left.noise_rad / left.noise_scale[:, None])
         has_shift = bool(prior.covariance[STATION, STATION].any())
-        h = sky_partials(path.at(seen.tai_s), partials.at(seen.tai_s), here, has_shift)
+        h = sky_partials(path.at(seen.tai_s), partials.at(seen.tai_s), here, has_shift, seen.sense)
         across, both, upward = covariance_on_sky(prior.covariance, h)
         across, upward = across + noise[0], upward + noise[1]
         x, y = left.off_rad

@@ -27,6 +27,7 @@ STATE_COUNT = 17
 ORBIT, BIAS, STATION, MOUNT = slice(0, 6), slice(6, 10), slice(10, 13), slice(13, 17)
 MOUNT_TERMS = ("npae_deg", "an_deg", "aw_deg", "tf_deg")  # of pointing.mount, in the order of the states
 EL_COT = 9
+PLUNGED_STATES = [7, 8, 13]  # CA, IE, NPAE: they turn with the elevation axis, and show the other way when plunged
 STEPS = (1e-5, 1e-5, 1e-10, 1e-5, 1e-5, 1e-5)  # for differences: some 70 m each; 60 m after a day for the mean motion
 
 _UP_SHARE = 0.1  # coordinates are rounded in latitude and longitude; heights are known much better

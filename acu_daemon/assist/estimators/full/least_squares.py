@@ -122,7 +122,8 @@ def _sweeps(
         path, here = path_itrs(batch.source, x, batch.site, nodes), site_of(batch.site, x)
         left = residuals(path, here, x, batch.settings, seen)
         points = normal_points(seen.tai_s, left, starts)
-        h = sky_partials(path.at(points.tai_s), partials.curve.at(points.tai_s), here, has_shift)
+        moved = path.at(points.tai_s), partials.curve.at(points.tai_s)
+        h = sky_partials(*moved, here, has_shift, seen.sense[starts])
         new, covariance, fitted_count = _step(batch.prior, x, h, points, factor)
         step_rad = float(np.max(np.abs(np.tensordot(new - x, h, 1)), initial=0.0))
         x = new

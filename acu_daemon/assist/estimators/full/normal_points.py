@@ -29,19 +29,24 @@ _MOST_NOISE = 10.0  # times the configured one: beyond it the path is not found 
 
 @dataclass(frozen=True, slots=True)
 class Sights:
-    """Readings, oldest first: their times, and sine and cosine of both angles; every array (N,)."""
+    """Readings, oldest first: their times, and sine and cosine of both angles; every array (N,).
+
+    sense: -1 where the antenna was plunged, else 1: by which sign the states of PLUNGED_STATES show on the sky.
+    """
 
     tai_s: Array
     sin_az: Array
     cos_az: Array
     sin_el: Array
     cos_el: Array
+    sense: Array
 
 
 def sights(readings: Readings) -> Sights:
     """Take sines and cosines of readings, once for all sweeps."""
     az, el = np.radians(readings.az_deg), np.radians(readings.el_deg)
-    return Sights(readings.tai_s, np.sin(az), np.cos(az), np.sin(el), np.cos(el))
+    sense = np.ones(az.size) if readings.was_plunged is None else np.where(readings.was_plunged, -1.0, 1.0)
+    return Sights(readings.tai_s, np.sin(az), np.cos(az), np.sin(el), np.cos(el), sense)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,11 +70,15 @@ def residuals(path: Curve, here: Site, x: Array, settings: EstimatorSettings, se
     low = _refraction_shape(path, here, seen.tai_s) if x[EL_COT] and has_air(here) else cot
     az, az_sec, el, el_cot = x[BIAS]
     off, sigma = np.empty((2, 2, seen.tai_s.size))
-    off[0] = seen.sin_az * north - seen.cos_az * east - az * cos_el - az_sec
-    off[1] = seen.sin_el * (seen.sin_az * east + seen.cos_az * north) - seen.cos_el * up - el - el_cot * low
+    off[0] = seen.sin_az * north - seen.cos_az * east - az * cos_el - az_sec * seen.sense
+    off[1] = (
+        seen.sin_el * (seen.sin_az * east + seen.cos_az * north) - seen.cos_el * up - el * seen.sense - el_cot * low
+    )
     if x[MOUNT].any():
         flat = np.maximum(cos_el, 1e-9)
-        off -= np.tensordot(x[MOUNT], axes_on_the_sky(east / flat, north / flat, up, cos_el), 1)
+        axes = axes_on_the_sky(east / flat, north / flat, up, cos_el)
+        axes[0] *= seen.sense
+        off -= np.tensordot(x[MOUNT], axes, 1)
     sigma[0] = settings.sigma_azimuth_deg * DEG
     sigma[1] = (settings.sigma_elevation_deg + settings.sigma_elevation_cot_deg * cot) * DEG
     sigmas_off = off / sigma

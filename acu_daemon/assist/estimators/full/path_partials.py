@@ -8,6 +8,7 @@ import numpy as np
 from acu_daemon.assist.estimators.full.estimated_states import (
     MOUNT,
     ORBIT_COUNT,
+    PLUNGED_STATES,
     STATE_COUNT,
     STATION,
     STEPS,
@@ -120,8 +121,10 @@ def enu_m(r_itrs_m: Array, site: Site) -> Array:
     return enu
 
 
-def sky_partials(r_itrs_m: Array, orbit_itrs: Array, site: Site, has_shift: bool) -> Array:
+def sky_partials(r_itrs_m: Array, orbit_itrs: Array, site: Site, has_shift: bool, sense: Array | float = 1.0) -> Array:
     """What a unit of each state moves on the sky: (17, 2, N), across the elevation and in elevation, rad.
+
+    sense: -1 for an antenna that is plunged, () or (N,).
 
     r_itrs_m: (3, N); orbit_itrs: (6, 3, N), the second of `orbit_partials_itrs`; site: moved by the states; has_shift:
     whether the station's place is in question.
@@ -147,6 +150,7 @@ def sky_partials(r_itrs_m: Array, orbit_itrs: Array, site: Site, has_shift: bool
     if has_shift:
         out[STATION] = turned(station_partials_enu(r_itrs_m, site))
     out[MOUNT] = axes_on_the_sky(sin_az, cos_az, sin_el, cos_el)
+    out[PLUNGED_STATES] *= sense
     return out
 
 
