@@ -23,7 +23,7 @@ from acu_daemon.config.onboard_tables import (
     PassSection,
     TargetRow,
 )
-from acu_daemon.config.outlet_tables import MetricsSection, RotctldSection
+from acu_daemon.config.outlet_tables import MetricsSection, MqttSection, RotctldSection
 from acu_daemon.config.recording_tables import RecordingSection
 from acu_daemon.config.satellite_tables import BrouwerSection, ElementsFileSection, LimitsSection
 from acu_daemon.config.schedule_tables import MaintenanceSection
@@ -96,6 +96,10 @@ OUT_OF_SAID: dict[str, tuple[type[Section], dict[str, Any]]] = {  # ranges that 
     "WindSection.udp": (WindSection, {"udp": "4841"}),
     "WebSection.listen": (WebSection, {"listen": "localhost:8642"}),
     "RotctldSection.listen": (RotctldSection, {"listen": "localhost:4533"}),
+    "MqttSection.url": (MqttSection, {"url": "http://broker"}),
+    "MqttSection.topic": (MqttSection, {"topic": "a/#"}),
+    "MqttSection.password_file": (MqttSection, {"password_file": ""}),
+    "MqttSection.discovery_prefix": (MqttSection, {"discovery_prefix": "+"}),
     "MetricsSection.listen": (MetricsSection, {"listen": "localhost:9842"}),
     "WebSection.token_file": (WebSection, {"token_file": ""}),
     "WebSection.names": (WebSection, {"names": [""]}),

@@ -4,10 +4,12 @@ import asyncio
 import contextlib
 import ipaddress
 import shutil
+import stat
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from acu_daemon.cli.page import PageFrame
 from acu_daemon.config.station_tables import StationFile
 from acu_daemon.control.lease import LASTS_S, Claim
 from acu_daemon.control.tick_input import SlaveWish
@@ -33,19 +35,28 @@ Answer = Callable[[str, str], str]
 
 
 class Outlets:
-    """Owned by the loop.  current: the run that goes on; wind: what is known of it, of a station that watches it."""
+    """Owned by the loop.
+
+    page: whose lease and log are shared; current: the run that goes on; of a station wind and passes; config: the
+    directory beside which files are.  UsageError: of a password's file.
+    """
 
     def __init__(
         self,
         station: StationFile,
         directory: Path,
         clock: Clock,
-        lease: WriteLease | None = None,
+        page: PageFrame | None = None,
         current: Callable[[], Service | None] = lambda: None,
         wind: Callable[[], WindWatch] = WindWatch,
+        passes: Callable[[], list[dict[str, Any]]] | None = None,
+        config: Path = Path(),
     ) -> None:
         self.tally = Tally()
-        self.lease = WriteLease(clock.monotonic_s) if lease is None else lease
+        self.lease = WriteLease(clock.monotonic_s) if page is None else page.lease
+        self._page, self._passes = page, passes
+        file = station.mqtt.password_file
+        self._password = None if file is None else read_password(config / file)
         self._station, self._directory, self._wind = station, directory, wind
         self._clock, self._current = clock, current
         self._answer: Answer = lambda _line, _who: "error the daemon starts"
@@ -63,6 +74,8 @@ class Outlets:
             self._metrics = MetricsServer(self.tally, self._around)
             await self._metrics.open(*address)
             self._tasks.append(asyncio.create_task(self._watch_disk(), name="disk"))
+        if (broker := self._station.mqtt.broker) is not None:
+            self._publish(*broker)
         if (address := self._station.rotctld.address) is not None:
             from acu_daemon.cli.led_antenna import DaemonSeen, LedAntenna
             from acu_daemon.outlets.rotctld_port import RotctldPort
@@ -71,6 +84,31 @@ class Outlets:
             self._antenna = LedAntenna(self._station, seen)
             self._rotctld = RotctldPort(self._antenna, self.lease, self._clock.monotonic_s)
             await self._rotctld.open(*address)
+
+    def _publish(self, host: str, port: int, is_tls: bool) -> None:
+        """Begin to publish."""
+        from acu_daemon.outlets.mqtt_messages import Topics
+        from acu_daemon.outlets.mqtt_publisher import BrokerAddress, MqttPublisher, MqttSources
+
+        section = self._station.mqtt
+        broker = BrokerAddress(host, port, is_tls, section.user, self._password, section.discovery_prefix)
+        topics = Topics(section.topic, self._station.station.name)
+        publisher = MqttPublisher(broker, topics, MqttSources(lambda: self.tally.seen, self._events, self._schedule))
+        self._tasks.append(asyncio.create_task(publisher.run(), name="mqtt"))
+
+    def _events(self) -> tuple[int, Callable[[], list[dict[str, str]]]]:
+        """How many lines the log has had, and what has the newest of them."""
+        return (0, list) if self._page is None else (self._page.events.count, self._page.events.lines)
+
+    def _schedule(self) -> list[Any]:
+        """The passes to come: of a station those of its schedule, else the one in hand and what is said of others."""
+        if self._passes is not None:
+            return self._passes()
+        seen = self.tally.seen
+        if seen is None or not seen.rise_utc:
+            return []
+        now = {"satellite": seen.satellite, "rise_utc": seen.rise_utc, "set_utc": seen.set_utc}
+        return [now | {"culmination_deg": seen.culmination_deg}, *({"text": text} for text in seen.next_passes)]
 
     def see(self, _seen: Snapshot) -> None:
         """A tick is over, and this is to be seen; the tally has it already."""
@@ -156,6 +194,17 @@ class Outlets:
             with contextlib.suppress(OSError, RuntimeError):
                 self._disk_free_bytes = (await asyncio.to_thread(shutil.disk_usage, self._directory)).free
             await asyncio.sleep(DISK_S)
+
+
+def read_password(path: Path) -> str:
+    """The password of a file that nobody else may read.  UsageError: says what to do."""
+    try:
+        mode = stat.S_IMODE(path.stat().st_mode)
+        if not path.is_file() or mode & 0o077:
+            raise UsageError(f"[mqtt] password_file {path}: expected a file of mode 0600, it is {mode:04o}: chmod 600")
+        return path.read_text(encoding="utf-8").strip()
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(f"[mqtt] password_file {path}: {error}") from None
 
 
 def via_of(who: str) -> str:

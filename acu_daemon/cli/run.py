@@ -260,7 +260,9 @@ async def _run(
     snapshots = SnapshotFile(frame.directory, frame.files, snapshot_ticks)
     elements = ElementsWatch(frame.config, frame.name, first.target, clock, frame.folders)
     section = first.target.station.elements
-    outlets = Outlets(first.target.station, frame.directory, clock, page_frame.lease, lambda: runs.service)
+    outlets = Outlets(
+        first.target.station, frame.directory, clock, page_frame, lambda: runs.service, config=frame.config
+    )
     fetching = ElementsFetching(
         frame.config, section, clock, is_rehearsal=clock.is_rehearsal, on_asked=outlets.asked_for_elements
     )

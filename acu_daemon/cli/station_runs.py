@@ -50,9 +50,15 @@ class StationRuns:
 
     def __init__(self, setup: StationSetup, first: Target, live: LiveLine | None) -> None:
         self._setup, self._first, self._live = setup, first, live
-        lease = None if setup.page is None else setup.page.lease
         self.outlets = Outlets(
-            first.station, setup.directory, setup.clock, lease, lambda: self._service, lambda: self.day.wind.seen
+            first.station,
+            setup.directory,
+            setup.clock,
+            setup.page,
+            lambda: self._service,
+            lambda: self.day.wind.seen,
+            self._passes,
+            setup.config,
         )
         self.day = StationDay(
             setup.config,

@@ -8,7 +8,7 @@ from acu_daemon.config.acu_tables import AcuSection
 from acu_daemon.config.antenna_tables import AtmosphereSection, MountSection, antenna_of
 from acu_daemon.config.elements_tables import ElementsSourcesSection
 from acu_daemon.config.envelope_tables import EnvelopeSection
-from acu_daemon.config.outlet_tables import MetricsSection, RotctldSection
+from acu_daemon.config.outlet_tables import MetricsSection, MqttSection, RotctldSection
 from acu_daemon.config.recording_tables import RecordingSection
 from acu_daemon.config.schedule_tables import ScheduleSection
 from acu_daemon.config.section import Name, Section
@@ -194,6 +194,7 @@ class StationFile(Section):
     hooks: HooksSection = Field(
         default=HooksSection(), description="Programs that are started at what happens in a pass (docs/schedule.md)."
     )
+    mqtt: MqttSection = Field(default=MqttSection(), description="The MQTT broker that is told (docs/mqtt.md).")
     rotctld: RotctldSection = Field(
         default=RotctldSection(), description="The port for programs that speak to rotators (docs/rotctld.md)."
     )

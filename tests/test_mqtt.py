@@ -1,0 +1,299 @@
+"""MQTT: what is published, and a real Mosquitto: will, password, a broker that goes away for long and comes back."""
+
+import asyncio
+import contextlib
+import json
+import shutil
+import signal
+import socket
+import subprocess
+import time
+from collections.abc import AsyncIterator, Callable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import aiomqtt
+import pytest
+from flights import demo_target
+from script_modules import load
+from test_live_line import SEEN
+
+from acu_daemon.cli.outlets_beside import Outlets, read_password
+from acu_daemon.config.load import load_station
+from acu_daemon.daemon.snapshot import Snapshot
+from acu_daemon.edge.clock import LoopClock
+from acu_daemon.errors import ConfigError, UsageError
+from acu_daemon.outlets import mqtt_publisher
+from acu_daemon.outlets.mqtt_messages import Topics, discovery
+from acu_daemon.outlets.mqtt_publisher import BrokerAddress, MqttPublisher, MqttSources
+from acu_daemon.web.recent_events import KEPT, RecentEvents
+
+PATIENCE_S = 90.0
+MOSQUITTO = shutil.which("mosquitto", path="/usr/sbin:/usr/bin:/usr/local/sbin:/usr/local/bin")
+needs_mosquitto = pytest.mark.skipif(MOSQUITTO is None, reason="needs mosquitto: apt-get install mosquitto")
+pass_rig = load("pass_rig")
+TOPICS = Topics("site/dish", "Dish")
+
+
+# Messages
+
+
+def test_the_state_is_the_snapshot_with_its_alarms() -> None:
+    message = TOPICS.state(replace(SEEN, latch="azimuth stands still"))
+    told = json.loads(message.payload)
+    assert (message.topic, message.is_retained) == ("site/dish/state", True)
+    assert told["az_deg"] == SEEN.az_deg
+    assert told["alarms"][0] == "latched: azimuth stands still"
+
+
+def test_home_assistant_finds_a_device_whose_sensors_are_keys_of_the_state() -> None:
+    state = json.loads(TOPICS.state(SEEN).payload)
+    found = {message.topic: json.loads(message.payload) for message in discovery(TOPICS, "homeassistant")}
+    assert len(found) == 15
+    assert all(topic.startswith("homeassistant/") and topic.endswith("/config") for topic in found)
+    for topic, told in found.items():
+        assert topic.split("/")[3] in state
+        assert (told["state_topic"], told["availability_topic"]) == ("site/dish/state", "site/dish/availability")
+        assert told["device"]["identifiers"] == ["site_dish"]
+    assert len({told["unique_id"] for told in found.values()}) == len(found)
+    azimuth = found["homeassistant/sensor/site_dish/az_deg/config"]
+    assert (azimuth["unit_of_measurement"], azimuth["suggested_display_precision"]) == ("°", 2)
+
+
+# Configuration
+
+
+def configured(directory: Path, keys: str) -> Path:
+    shutil.copytree(Path(__file__).resolve().parents[1] / "config", directory / "config")
+    station = directory / "config" / "station.toml"
+    station.write_text(station.read_text() + f"\n[mqtt]\n{keys}\n")
+    return directory / "config"
+
+
+@pytest.mark.parametrize(
+    ("keys", "reason"),
+    [
+        ('url = "http://broker:1"', "expected mqtt://HOST:PORT"),
+        ('url = "mqtt://me:secret@broker"', "a user and a password have keys of their own"),
+        ('url = "mqtt://broker:99999"', "expected mqtt://HOST:PORT"),
+        ('topic = "a/#"', "expected a topic without"),
+        ('topic = "/a"', "expected a topic without"),
+        ('password_file = "x"', "expected a user too"),
+    ],
+)
+def test_a_wrong_key_says_what_is_expected(tmp_path: Path, keys: str, reason: str) -> None:
+    with pytest.raises(ConfigError, match=reason):
+        load_station(configured(tmp_path, keys))
+
+
+@pytest.mark.parametrize(
+    ("url", "broker"),
+    [
+        ("mqtt://broker", ("broker", 1883, False)),
+        ("mqtts://broker", ("broker", 8883, True)),
+        ("mqtt://10.0.0.1:18", ("10.0.0.1", 18, False)),
+    ],
+)
+def test_a_broker_has_its_usual_port(tmp_path: Path, url: str, broker: tuple[str, int, bool]) -> None:
+    assert load_station(configured(tmp_path, f'url = "{url}"')).mqtt.broker == broker
+
+
+def test_a_password_that_others_may_read_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "password"
+    file.write_text("secret\n")
+    file.chmod(0o644)
+    with pytest.raises(UsageError, match="expected a file of mode 0600, it is 0644"):
+        read_password(file)
+    file.chmod(0o600)
+    assert read_password(file) == "secret"
+    with pytest.raises(UsageError, match="No such file"):
+        read_password(tmp_path / "none")
+
+
+# A broker
+
+
+class Broker:
+    """Debian's broker, on a port of its own."""
+
+    def __init__(self, directory: Path, port: int, more: str = "allow_anonymous true\n") -> None:
+        directory.mkdir(exist_ok=True)
+        self._port, self._file = port, directory / "mosquitto.conf"
+        self._file.write_text(f"listener {port} 127.0.0.1\n{more}")
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        with self._file.with_suffix(".log").open("a") as log:
+            self._process = subprocess.Popen([str(MOSQUITTO), "-c", str(self._file)], stdout=log, stderr=log)
+        end_s = time.monotonic() + PATIENCE_S
+        while time.monotonic() < end_s:
+            with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", self._port), 1.0):
+                break
+            time.sleep(0.05)
+
+    def kill(self) -> None:
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait(PATIENCE_S)
+
+
+@contextlib.contextmanager
+def mosquitto(directory: Path, port: int, more: str = "allow_anonymous true\n") -> Iterator[Broker]:
+    broker = Broker(directory, port, more)
+    broker.start()
+    try:
+        yield broker
+    finally:
+        broker.kill()
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return int(server.getsockname()[1])
+
+
+@dataclass
+class Station:
+    """What a station has to tell."""
+
+    seen: Snapshot = SEEN
+    passes: list[Any] = field(default_factory=list)
+    events: RecentEvents = field(default_factory=RecentEvents)
+
+    def sources(self) -> MqttSources:
+        return MqttSources(lambda: self.seen, lambda: (self.events.count, self.events.lines), lambda: self.passes)
+
+
+@contextlib.asynccontextmanager
+async def published(station: Station, port: int, **more: Any) -> AsyncIterator[MqttPublisher]:
+    broker = BrokerAddress("127.0.0.1", port, **more)
+    publisher = MqttPublisher(broker, TOPICS, station.sources(), (0.05, 0.2))
+    task = asyncio.create_task(publisher.run())
+    try:
+        yield publisher
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+@contextlib.asynccontextmanager
+async def listening(port: int, *topics: str, **more: Any) -> AsyncIterator[Callable[[str], Any]]:
+    """A client of its own; yields what waits for the next message of a topic."""
+    async with aiomqtt.Client("127.0.0.1", port, **more) as client:
+        for topic in topics:
+            await client.subscribe(topic, qos=1)
+        messages = client.messages.__aiter__()
+
+        async def following(topic: str) -> bytes:
+            async with asyncio.timeout(PATIENCE_S):
+                while True:
+                    message = await messages.__anext__()
+                    if message.topic.matches(topic):
+                        return bytes(message.payload)
+
+        yield following
+
+
+@needs_mosquitto
+@pytest.mark.realtime
+async def test_a_real_broker_is_told_state_events_schedule_and_home_assistant(tmp_path: Path) -> None:
+    port, station = free_port(), Station(passes=[{"satellite": "SCD-1"}])
+    station.events.add({"event": "state.changed", "state": "PREPOSITION", "level": "info"})
+    with mosquitto(tmp_path / "broker", port):
+        async with published(station, port), listening(port, "site/#", "homeassistant/#") as following:
+            assert await following("site/dish/availability") == b"online"
+            assert json.loads(await following("homeassistant/sensor/site_dish/az_deg/config"))["name"] == "Azimuth"
+            assert json.loads(await following("site/dish/state"))["state"] == SEEN.state
+            station.events.add({"event": "signal.lost", "level": "warning"})
+            told = json.loads(await following("site/dish/event"))
+            told = told if told["event"] == "signal.lost" else json.loads(await following("site/dish/event"))
+            assert (told["event"], told["level"]) == ("signal.lost", "warning")
+            station.passes = [{"satellite": "NOAA 20"}]
+            assert json.loads(await following("site/dish/schedule")) == station.passes
+        async with listening(port, "site/#") as following:  # what is kept, for who comes later
+            assert await following("site/dish/availability") == b"offline"
+
+
+@needs_mosquitto
+@pytest.mark.realtime
+async def test_a_broker_that_was_gone_for_an_hour_is_told_the_newest_and_nothing_has_queued(tmp_path: Path) -> None:
+    port, station = free_port(), Station()
+    with mosquitto(tmp_path / "broker", port) as broker:
+        async with published(station, port) as publisher:
+            async with listening(port, "site/dish/state") as following:
+                await following("site/dish/state")
+            first_count = publisher.connect_count
+            broker.kill()
+            for second in range(3600):  # an hour of them, as fast as they can be told
+                station.seen = replace(SEEN, tai_s=SEEN.tai_s + second)
+                station.events.add({"event": "tick", "number": second, "level": "info"})
+                if second % 100 == 0:
+                    await asyncio.sleep(0.01)
+            assert len(station.events.lines()) == KEPT
+            broker.start()
+            async with listening(port, "site/dish/+") as following:
+                told = json.loads(await following("site/dish/state"))
+                assert told["tai_s"] == SEEN.tai_s + 3599
+            assert publisher.connect_count > first_count
+
+
+@needs_mosquitto
+@pytest.mark.realtime
+async def test_user_and_password_are_given_and_wrong_ones_are_tried_again_in_peace(tmp_path: Path) -> None:
+    port, station, file = free_port(), Station(), tmp_path / "users"
+    subprocess.run(["mosquitto_passwd", "-b", "-c", str(file), "dish", "secret"], check=True, capture_output=True)
+    file.chmod(0o644)
+    more = f"allow_anonymous false\npassword_file {file}\nuser root\n"
+    with mosquitto(tmp_path / "broker", port, more):
+        async with published(station, port, user="dish", password="wrong") as refused:
+            await asyncio.sleep(0.5)
+            assert refused.connect_count == 0
+        async with published(station, port, user="dish", password="secret") as publisher:
+            async with listening(port, "site/#", username="dish", password="secret") as following:
+                assert await following("site/dish/availability") == b"online"
+            assert publisher.connect_count == 1
+
+
+async def test_a_broker_that_takes_connections_and_says_nothing_keeps_nobody_waiting(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(mqtt_publisher, "PATIENCE_S", 0.2)
+    with socket.create_server(("127.0.0.1", 0)) as mute:
+        port = mute.getsockname()[1]
+        async with published(Station(), port) as publisher, asyncio.timeout(PATIENCE_S):
+            while not publisher._said:
+                await asyncio.sleep(0.02)
+        assert publisher.connect_count == 0
+
+
+@needs_mosquitto
+@pytest.mark.realtime
+async def test_a_daemon_that_is_killed_is_offline_by_its_will(tmp_path: Path) -> None:
+    port, scene = free_port(), pass_rig.make_scene(tmp_path / "scene", None, 120.0)
+
+    def wait_for(is_so: Callable[[], object]) -> None:
+        end_s = time.monotonic() + PATIENCE_S
+        while not is_so():
+            assert time.monotonic() < end_s
+            time.sleep(0.05)
+
+    with mosquitto(tmp_path / "broker", port), pass_rig.rigs(scene, ["tcp"], tmp_path) as [rig]:
+        rig.start_acu()
+        station = rig.config / "station.toml"
+        station.write_text(station.read_text() + f'\n[mqtt]\nurl = "mqtt://127.0.0.1:{port}"\n')
+        rig.start_daemon()
+        await asyncio.to_thread(wait_for, lambda: rig.events("mqtt.connected"))
+        async with listening(port, "acu-daemon/#") as following:
+            assert await following("acu-daemon/availability") == b"online"
+            assert json.loads(await following("acu-daemon/state"))["is_rehearsal"] is True
+            assert "event" in json.loads(await following("acu-daemon/event"))
+            rig.daemon.send_signal(signal.SIGKILL)
+            assert await following("acu-daemon/availability") == b"offline"
+
+
+async def test_without_a_station_the_schedule_is_the_pass_in_hand(tmp_path: Path) -> None:
+    outlets = Outlets(demo_target().station, tmp_path, LoopClock(0.0))
+    assert outlets._schedule() == []
+    outlets.tally.seen = replace(SEEN, satellite="SCD-1", rise_utc="2026-01-01T00:00:00Z", next_passes=("X 12:00",))
+    assert [one.get("satellite") or one["text"] for one in outlets._schedule()] == ["SCD-1", "X 12:00"]
