@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from acu_daemon.cli.outputs import refuse_unwritable
+from acu_daemon.cli.pass_messages import write_messages
 from acu_daemon.cli.replay_wire import ReplayedPass, replay_pass
 from acu_daemon.edge.tape_file import SUFFIX
 from acu_daemon.edge.writer import replace_file
@@ -44,7 +45,7 @@ def command(
         out.mkdir(parents=True, exist_ok=True)
     differing = 0
     for path in files:
-        done, page = make_report(path, out or path.parent)
+        done, page = make_report(path, out or path.parent, config)
         typer.echo(page)
         if done.difference is not None:
             differing += 1
@@ -59,8 +60,11 @@ def _recordings(given: Path) -> list[Path]:
     return sorted(given.glob(f"*{SUFFIX}")) if given.is_dir() else [given]
 
 
-def make_report(path: Path, folder: Path) -> tuple[ReplayedPass, Path]:
-    """Replay a recording, and write what it shows.  UsageError: it is none, or the report cannot be written."""
+def make_report(path: Path, folder: Path, config: Path | None = None) -> tuple[ReplayedPass, Path]:
+    """Replay a recording, and write what it shows, with its messages.
+
+    UsageError: it is no recording, or the report cannot be written.
+    """
     watch = PassWatch()
     done = replay_pass(path, watch)
     target = done.taped.target
@@ -74,6 +78,7 @@ def make_report(path: Path, folder: Path) -> tuple[ReplayedPass, Path]:
     refuse_unwritable(page, data)
     replace_file(data, f"{json.dumps(figures, allow_nan=False)}\n".encode())
     replace_file(page, pass_page(figures).encode())
+    write_messages(done.taped, watch, folder, name, config)
     return done, page
 
 

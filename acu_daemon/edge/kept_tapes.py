@@ -29,8 +29,12 @@ class KeepRules:
 def tape_name(rise_tai_s: float, satellite: str) -> str:
     """Names sort by the time of the pass."""
     utc = utc_text(rise_tai_s, 0).replace("-", "").replace(":", "")
-    name = re.sub(r"[^\w.]+", "-", satellite, flags=re.ASCII).strip("-.")[:_LONGEST_NAME]
-    return f"{utc}-{name or 'satellite'}{SUFFIX}"
+    return f"{utc}-{safe_name(satellite)}{SUFFIX}"
+
+
+def safe_name(satellite: str) -> str:
+    """A satellite's name as a part of a file's."""
+    return re.sub(r"[^\w.]+", "-", satellite, flags=re.ASCII).strip("-.")[:_LONGEST_NAME] or "satellite"
 
 
 def remove_old(directory: Path, rules: KeepRules, now_unix_s: float | None = None) -> list[Path]:
