@@ -26,7 +26,7 @@ from acu_daemon.errors import UsageError
 SUFFIX = ".tape.gz"
 FORMAT = 1
 HAND_OVER_S = 0.4  # so long records wait in the loop at most, a tick more where it comes late
-LEVEL = 6
+LEVEL = 4
 LARGEST_BYTES = 200_000_000  # of a file: a month of one pass at 10 Hz
 _LARGEST_TEXT = 4_000_000_000
 _CHUNK = 65536

@@ -21,8 +21,6 @@ from acu_daemon.units import Array
 
 _TAI_STEPS = 2.0**24
 _NS = 1e9
-_MONOTONIC_FIRST = "XRNQ"
-_TAI_FIRST = "TPSBAUZ"
 
 
 class TapeError(AcuDaemonError):
@@ -66,21 +64,36 @@ class TapeWriter:
         self._monotonic, self._tai = _Steps(_NS), _Steps(_TAI_STEPS)
 
     def line(self, record: Record) -> str:
-        """One line with its end."""
-        return f"{record[0]}{self._values(record)}\n"
+        """One line with its end; the five of every tick first."""
+        letter = record[0]
+        if letter == "H":
+            return "H\n"
+        if letter == "D":
+            return f"D{record[1]}\n"
+        if letter == "R":
+            return f"R{self._monotonic.text(record[1])} {record[2].hex() or '-'}\n"
+        if letter == "X":
+            return f"X{self._exchange(record)}\n"
+        if letter == "T":
+            return f"T{self._tick(record)}\n"
+        return "G\n" if letter == "G" else f"{letter}{self._values(record)}\n"
+
+    def _exchange(self, record: Record) -> str:
+        _, started_s, started_tai_s, unread, frame = record
+        times = f"{self._monotonic.text(started_s)} {self._tai.text(started_tai_s)}"
+        return f"{times} {unread.hex() or '-'} {frame.hex() or '-'}"
+
+    def _tick(self, record: Record) -> str:
+        _, now_tai_s, silence_s, has_room, requests, signal = record
+        silence = "0" if silence_s == 0.0 else repr(silence_s)
+        said = ""
+        if requests or signal is not None:
+            more = [[_asking_json(one) for one in requests], None if signal is None else list(astuple(signal))]
+            said = f" {json.dumps(more, separators=(',', ':'))}"
+        return f"{self._tai.text(now_tai_s)} {silence} {int(has_room)}{said}"
 
     def _values(self, record: Record) -> str:
         match record:
-            case ("T", now_tai_s, silence_s, has_room, requests, signal):
-                silence = "0" if silence_s == 0.0 else repr(silence_s)
-                more = [[_asking_json(one) for one in requests], None if signal is None else list(astuple(signal))]
-                said = f" {json.dumps(more, separators=(',', ':'))}" if requests or signal is not None else ""
-                return f"{self._tai.text(now_tai_s)} {silence} {int(has_room)}{said}"
-            case ("X", started_s, started_tai_s, unread, frame):
-                times = f"{self._monotonic.text(started_s)} {self._tai.text(started_tai_s)}"
-                return f"{times} {unread.hex() or '-'} {frame.hex() or '-'}"
-            case ("R", arrival_s, data):
-                return f"{self._monotonic.text(arrival_s)} {data.hex() or '-'}"
             case ("B", now_tai_s, low_water_s):
                 return f"{self._tai.text(now_tai_s)} {'-' if low_water_s is None else repr(low_water_s)}"
             case ("Z", now_tai_s, has_died, reason):
@@ -93,9 +106,9 @@ class TapeWriter:
                 return json.dumps(what, separators=(",", ":"))
             case (("N" | "Q"), now_s):
                 return self._monotonic.text(now_s)
-            case (_, now_tai_s) if record[0] in _TAI_FIRST:
+            case (("P" | "S" | "A" | "U"), now_tai_s):
                 return self._tai.text(now_tai_s)
-        return " ".join(map(str, record[1:]))
+        raise ValueError(f"{record[0]!r} is no kind of record")
 
 
 class TapeReader:
