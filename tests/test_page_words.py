@@ -1,15 +1,19 @@
 """What the page keeps: alarms, events, the story of the pass, orders in words."""
 
+import re
 from dataclasses import replace
 from typing import Any
 
 import pytest
 from test_live_line import SEEN
 
+from acu_daemon.control.tracking.state_table import TrackState
+from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.web import alarm_book
 from acu_daemon.web.alarm_book import AlarmBook
-from acu_daemon.web.feed import to_json
+from acu_daemon.web.feed import alarms_shown, to_json
 from acu_daemon.web.order_desk import line_of
+from acu_daemon.web.page_server import page_files
 from acu_daemon.web.pass_story import STRIP_COUNT, PassStory
 from acu_daemon.web.recent_events import KEPT, LONGEST, RecentEvents
 
@@ -112,3 +116,21 @@ def test_what_is_not_finite_is_null_in_json() -> None:
         to_json({"a": [float("nan"), float("inf"), 1.23456789], "b": (None, True)})
         == '{"a":[null,null,1.23457],"b":[null,true]}'
     )
+
+
+def test_every_state_has_a_colour_in_the_timeline() -> None:
+    script = page_files()["page.js"][0].decode()
+    kinds = script[script.index("const KINDS") :].split("\n")[0]
+    assert [state for state in TrackState if not re.search(rf'[ {{"]{re.escape(state)}"?: "', kinds)] == []
+
+
+@pytest.mark.parametrize(
+    ("seen", "said"),
+    [
+        (replace(SEEN, state="IDLE", arming="disarmed", disarmed_by="a person"), ["disarmed by a person"]),
+        (replace(SEEN, arming="disarmed", disarmed_by="a person"), ["DISARMED by a person"]),
+        (replace(SEEN, encoder_problem="frozen"), ["frozen"]),
+    ],
+)
+def test_alarms_are_whole_sentences(seen: Snapshot, said: list[str]) -> None:
+    assert alarms_shown(seen) == said

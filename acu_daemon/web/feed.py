@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from acu_daemon.daemon.drawing import Aim, Backdrop, PathAhead
-from acu_daemon.daemon.overview import headline
+from acu_daemon.daemon.overview import headline, steering
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.daemon.verdict import alarms, verdict
 from acu_daemon.daemon.write_lease import WriteLease
@@ -148,6 +148,7 @@ class Feed:
             "level": said.level.name,
             "why": said.why,
             "headline": headline(seen),
+            "steering": steering(seen),
             "aim": None if aim is None else asdict(aim),
             "lease_left_s": self._lease.left_s(),
         }

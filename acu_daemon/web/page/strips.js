@@ -78,7 +78,7 @@ function unacquired() {
   return spans;
 }
 
-const KINDS = { IDLE: "dim", PREPOSITION: "calm", "ACQUIRE/TLE": "watch", "AUTOTRACK/TLE": "good", "AUTOTRACK/FITTED": "good", PROGRAM: "good", "HOLD/FITTED": "calm", "HOLD/TLE": "watch", SEARCH: "watch", ZENITH: "keyhole", "FALSE-LOCK": "watch", AVOID: "watch", MANUAL: "dim", STOW: "dim", FAULT: "bad", "LINK-LOST": "bad" };
+const KINDS = { IDLE: "dim", PREPOSITION: "calm", "ACQUIRE/TLE": "watch", "AUTOTRACK/TLE": "good", "AUTOTRACK/FITTED": "good", PROGRAM: "good", "HOLD/FITTED": "calm", "HOLD/TLE": "watch", SEARCH: "watch", ZENITH: "keyhole", "FALSE-LOCK": "watch", AVOID: "watch", SLAVED: "calm", MANUAL: "dim", STOW: "dim", FAULT: "bad", "LINK-LOST": "bad" };
 const TIME_W = 600, TIME_H = 92;
 function drawTimeline(now, back, states, ahead) {
   const svg = byId("timeline"), all = group(svg, "times");

@@ -1,16 +1,6 @@
 "use strict";
 // What stands in words and numbers.  Texts go in as text alone: a name is never taken for markup.
 const OLD_S = 1.0, OLD_RESTING_S = 2.5;
-const STEERING = {
-  IDLE: ["nobody", "the pass, when it comes near"], PREPOSITION: ["the daemon, to where the pass begins", "acquisition"],
-  "ACQUIRE/TLE": ["the daemon, by the elements", "autotrack, with the signal"], "AUTOTRACK/TLE": ["the ACU, by the signal", "the elements"],
-  "AUTOTRACK/FITTED": ["the ACU, by the signal", "the fit of this pass"], PROGRAM: ["the daemon, along the prediction", "nothing"],
-  "HOLD/FITTED": ["the daemon, by the fit of this pass", "autotrack, with the signal"], "HOLD/TLE": ["the daemon, by the elements", "autotrack, with the signal"],
-  SEARCH: ["the daemon, around the path", "autotrack, with the signal"], ZENITH: ["the daemon, past the zenith", "autotrack"],
-  "FALSE-LOCK": ["the daemon, back to the path", "autotrack"], AVOID: ["the daemon, clear of a keep-out", "autotrack"],
-  MANUAL: ["the local panel", "the daemon, when it gives control back"], STOW: ["the ACU, to its stow position", "the daemon, when it is left"],
-  FAULT: ["nobody", "a person"], "LINK-LOST": ["not known", "the daemon, when the ACU answers"],
-};
 const STANDS = new Set(["IDLE", "MANUAL", "STOW", "FAULT", "LINK-LOST"]);
 
 function say(id, text) {
@@ -47,7 +37,8 @@ function showVerdict(now) {
   const good = now.inside_s !== null && !STANDS.has(now.state) ? `; good for ${now.inside_s >= now.buffer_s - 0.3 ? ">" : ""}${now.inside_s.toFixed(0)} s without a signal` : "";
   say("why", `${now.why.replaceAll("`", "")}${off}${good}`);
   const isOff = now.state === "IDLE" && now.arming === "disarmed";
-  const [steers, next] = isOff ? ["nobody", "the daemon, when somebody arms it"] : STEERING[now.state] ?? ["-", "-"];
+  const [steers, ...then] = isOff ? ["nobody", "the daemon, when somebody arms it"] : now.steering.replace(/ \([^)]*\)$/, "").split("; ");
+  const next = then.join("; ").replace(/^then /, "").replace(/ (would take|takes) over/, "") || "nothing";
   say("steers", steers);
   say("next-steers", next);
   say("may-move", mayMove(now));
