@@ -1,5 +1,6 @@
 """The operator's page of `run` and `rehearse`: whether there is one, where, and what of the daemon it sees."""
 
+import asyncio
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -79,6 +80,9 @@ class RunningPage:
         """frame None: nothing has a page here."""
         self._choice = choice = None if frame is None else frame.choice
         self._server: PageServer | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._newest: Snapshot | None = None
+        self._woken = asyncio.Event()
         if frame is None or choice is None:
             return
         now_s = clock.monotonic_s
@@ -96,14 +100,34 @@ class RunningPage:
         except UsageError as error:
             log.error("page.not_open", reason=str(error))
         else:
+            self._task = asyncio.create_task(self._tend(), name="page feed")
             log.info("page.open", url=url, orders="with the token" if self._choice.token else "stop alone")
 
     def see(self, seen: Snapshot) -> None:
-        """Take the newest snapshot."""
-        if self._server is not None:
-            self._feed.see(seen)
+        """Take the newest snapshot; what is made of it is made after the tick."""
+        self._newest = seen
+        self._woken.set()
+
+    async def _tend(self) -> None:
+        """Feed the page.  An error of the page ends neither the daemon nor the page: it is told once."""
+        log: Any = structlog.get_logger("page")
+        has_failed = False
+        while True:
+            await self._woken.wait()
+            self._woken.clear()
+            try:
+                if self._newest is not None:
+                    self._feed.see(self._newest)
+            except Exception as error:  # noqa: BLE001  the top of the page's own task
+                if not has_failed:
+                    log.error("page.failed", reason=repr(error), advice="an error of ours: please report it")
+                has_failed = True
 
     async def close(self) -> None:
+        """End all that is served."""
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
         if self._server is not None:
             await self._server.close()
 

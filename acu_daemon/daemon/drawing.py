@@ -25,6 +25,7 @@ from acu_daemon.units import wrap_180
 
 Direction = tuple[float, float]
 TRACK_COUNT = 90  # points of a whole pass
+OWN_DEG = 1.5  # the elements' highest elevation is that of the pass
 AHEAD_S = 2.0  # from point to point of the prediction
 SIGMAS = 3.0
 SKYLINE_STEP_DEG = 5.0
@@ -121,13 +122,18 @@ def _spread_deg(prediction: Prediction | None, now_tai_s: float, speed_deg_s: fl
 
 
 def take_track(setup: RefitSetup, coming: Pass | None) -> tuple[tuple[float, float, float], ...]:
-    """The whole pass by its elements, TAI, azimuth and elevation; nothing where they do not reach."""
+    """The whole pass by its elements, TAI, azimuth and elevation; nothing where they do not reach.
+
+    Nor where they are another satellite's: a station at rest waits for one pass with the orbit of any satellite.
+    """
     if coming is None:
         return ()
     times = np.linspace(coming.rise_tai_s, coming.set_tai_s, TRACK_COUNT)
     try:
         seen = apparent_at(setup.propagator, times, setup.site)
     except OrbitError:
+        return ()
+    if abs(float(np.max(seen.el_deg)) - coming.culmination_el_deg) > OWN_DEG:
         return ()
     rounded = zip(times.tolist(), np.round(seen.az_deg, 2).tolist(), np.round(seen.el_deg, 2).tolist(), strict=True)
     return tuple(rounded)
