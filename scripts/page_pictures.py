@@ -16,8 +16,11 @@ from chromium import PROGRAM, Tab, chromium
 from pass_rig import make_scene, rigs
 from PIL import Image
 
+from acu_daemon.orbit.timescales import utc_text
+
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
-COLOURS = 96
+COLOURS = 255
+LOSSES_S = ((60.0, 75.0), (120.0, 140.0), (175.0, 240.0))  # of the signal, after the start
 TOKEN = "0123456789abcdef"
 
 
@@ -29,6 +32,10 @@ async def main() -> int:
     with tempfile.TemporaryDirectory(prefix="page-pictures-") as folder:
         scene = make_scene(Path(folder) / "scene", None, 400.0)
         with rigs(scene, ["tcp"], Path(folder)) as (rig,):
+            with (rig.config / "scenario.toml").open("a") as scenario:
+                for begin_s, end_s in LOSSES_S:
+                    from_utc, to_utc = (utc_text(scene.start_tai_s + at_s, 0) for at_s in (begin_s, end_s))
+                    scenario.write(f'\n[[loss]]\ncause = "silence-zone"\nfrom_utc = {from_utc}\nto_utc = {to_utc}\n')
             rig.start_acu()
             token = rig.config / "token"
             token.touch(mode=0o600)
@@ -51,7 +58,7 @@ async def look(tab: Tab) -> None:
     await tab.until("window.acuShown")
     for second in range(40, 200, 40):  # until the strips are worth looking at
         await tab.until(f"strip.length > {second}")
-    await tab.until("now.state === 'AUTOTRACK/FITTED'")
+    await tab.until("now.state === 'HOLD/FITTED' && now.state_s > 8")
     await save(tab, "page-desk")
     await tab.size(360, 780, is_phone=True)
     await tab.until("innerWidth === 360")
@@ -74,7 +81,7 @@ async def save(tab: Tab, name: str) -> None:
     path = PICTURES / f"{name}.png"
     await tab.picture(path)
     whole = Image.open(io.BytesIO(path.read_bytes())).convert("RGB")
-    whole.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
+    whole.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(path, optimize=True)
     print(f"{path}: {path.stat().st_size / 1e3:.0f} kB")
 
 

@@ -309,6 +309,7 @@ async def test_a_real_daemon_is_stopped_from_the_page_frozen_and_killed_under_it
         await until(lambda: rig.log.exists() and rig.events("page.open"))
         tab = await new_tab()
         await tab.open(rig.events("page.open")[0]["url"])
+        await tab.until(SHOWN)
         await tab.until("document.querySelector('#word').textContent === 'TRACKING'")
         os.kill(rig.daemon.pid, signal.SIGSTOP)
         await tab.until("!document.querySelector('#lost').hidden")
