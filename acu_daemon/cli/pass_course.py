@@ -133,6 +133,10 @@ class PassCourse:
         """A person gives the pass up."""
         self._tracked.cancelled_by = who or "a person"
 
+    def note(self, word: str) -> None:
+        """Remember something to say of the pass that is on."""
+        self._tracked.note(word)
+
     def keep_nudge(self) -> None:
         """The nudge that is in force at the end begins the satellite's next passes too."""
         self._tracked.is_nudge_kept = True

@@ -25,6 +25,7 @@ from acu_daemon.schedule.rules import PassRequest, Wish
 from acu_daemon.units import DAY_S
 
 PLAN_S = 600.0  # from plan to plan where nothing has changed
+WORDS_S = 5.0  # from look to look at people's words while a pass is on
 WORD = "a person's word"
 
 
@@ -46,6 +47,9 @@ class ScheduleKeeper:
         self._omitted: dict[str, str] = {}
         self._planned_tai_s = -math.inf
         self._planning: asyncio.Task[StationPlan] | None = None
+        self._hearing: asyncio.Task[Words] | None = None
+        self._heard_tai_s = -math.inf
+        self._interrupters: frozenset[str] = frozenset()  # satellites that may interrupt
         self._log: Any = structlog.get_logger("station")
 
     @property
@@ -55,8 +59,9 @@ class ScheduleKeeper:
 
     def close(self) -> None:
         """End what runs beside the loop."""
-        if self._planning is not None:
-            self._planning.cancel()
+        for task in (self._planning, self._hearing):
+            if task is not None:
+                task.cancel()
         self._file.close()
 
     # Plan
@@ -75,13 +80,7 @@ class ScheduleKeeper:
             self.anew_reason = WORD
         self._cancel_paused(now_tai_s)
         if self._planning is not None:
-            if self._planning.done():
-                done, self._planning = self._planning, None
-                try:
-                    self._take(done.result())
-                except AcuDaemonError as error:
-                    self._log.error("schedule.kept", reason=str(error))
-                    self._put_off(now_tai_s)
+            self._take_done(now_tai_s)
             return
         if not self.anew_reason and now_tai_s - self._planned_tai_s < PLAN_S:
             return
@@ -93,6 +92,42 @@ class ScheduleKeeper:
                 self._put_off(now_tai_s)
                 return
         self._planning = asyncio.create_task(self._beside(self._plan, now_tai_s), name="plan")
+
+    def look_in_pass(self, now_tai_s: float) -> None:
+        """Look at people's words, beside the loop; by them alone it is planned anew while a pass is on."""
+        if self._planning is not None:
+            self._take_done(now_tai_s)
+            return
+        if self._hearing is None:
+            if now_tai_s - self._heard_tai_s >= WORDS_S:
+                self._heard_tai_s = now_tai_s
+                self._hearing = asyncio.create_task(self._beside(self._file.words_beside), name="words")
+            return
+        if not self._hearing.done():
+            return
+        done, self._hearing = self._hearing, None
+        if done.exception() is None and (words := done.result()) != self.words:
+            self.words = words
+            self.anew_reason = WORD
+            self._planning = asyncio.create_task(self._beside(self._plan, now_tai_s), name="plan")
+
+    def _take_done(self, now_tai_s: float) -> None:
+        if self._planning is None or not self._planning.done():
+            return
+        done, self._planning = self._planning, None
+        try:
+            self._take(done.result())
+        except AcuDaemonError as error:
+            self._log.error("schedule.kept", reason=str(error))
+            self._put_off(now_tai_s)
+
+    def interrupter(self, running: Entry, now_tai_s: float, lead_s: float) -> Entry | None:
+        """The pass for which that in progress is given up now: granted, of a higher priority, and its file says so."""
+        entry = self.coming()
+        if entry is None or entry.start_tai_s is None or entry.satellite not in self._interrupters:
+            return None
+        is_due = entry.start_tai_s - lead_s <= now_tai_s and entry.start_tai_s < running.set_tai_s
+        return entry if is_due and entry.priority > running.priority else None
 
     def _cancel_paused(self, now_tai_s: float) -> None:
         """Of a pass that a pause is over, and of which half is gone, nothing is tracked any more."""
@@ -120,6 +155,8 @@ class ScheduleKeeper:
             if self._omitted.get(name) != reason:
                 self._log.warning("satellite.omitted", satellite=name, reason=reason)
         self._omitted = plan.omitted
+        tracks = (decision.track for decision in plan.decisions)
+        self._interrupters = frozenset(one.satellite for one in tracks if one.rules.may_interrupt)
         result = merged(self.book, plan.decisions, now_tai_s, plan.until_tai_s, self._next_number)
         self.book = result.book
         self._next_number = max([self._next_number, *(one.number + 1 for one in result.book)])

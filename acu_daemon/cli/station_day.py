@@ -27,6 +27,7 @@ from acu_daemon.cli.schedule_keeper import ScheduleKeeper
 from acu_daemon.cli.station_wind import Beside, StationWind
 from acu_daemon.config.station_tables import StationFile
 from acu_daemon.control.tick_input import StowBy, StowWish
+from acu_daemon.control.tracking.approach import longest_lead_s
 from acu_daemon.daemon.snapshot import Snapshot, StationFacts
 from acu_daemon.daemon.tally import Tally
 from acu_daemon.edge.clock import Clock
@@ -183,6 +184,19 @@ class StationDay:
         if seen.az_deg is not None and seen.el_deg is not None:
             self._place = seen.az_deg, seen.el_deg
         self.course.see(seen)
+
+    def interrupter(self, now_tai_s: float) -> Entry | None:
+        """The pass for which the one that is on is given up now; None: none is worth it."""
+        running, acu = self.course.entry, self.station.acu
+        if running is None:
+            return None
+        self.keeper.look_in_pass(now_tai_s)
+        way_s = longest_lead_s(acu.azimuth.limits(), acu.elevation.limits(), 0.0)
+        entry = self.keeper.interrupter(running, now_tai_s, way_s)
+        if entry is None or self.stow_by is not StowBy.NOBODY or self.wind.seen.wants_stow:
+            return None
+        self.course.note(f"given up for {entry.name}")
+        return entry
 
     def facts(self) -> StationFacts:
         """What is shown of the station beside the run."""

@@ -127,11 +127,12 @@ class StationRuns:
             if outcome.reason == LED:
                 outcome = await self._led()
             elif outcome.reason.endswith(" begins") and entry is not None:
-                outcome = await self._pass() or outcome
+                outcome = await self._pass() or replace(outcome, reason="it cannot begin")
             elif not self._is_placed and isinstance(after := self.day.after(), tuple):
                 self._is_placed = True
                 outcome = await self._move(*after)
-            if not self._stop_reason and outcome.reason != "duration over":
+            is_handed_over = outcome.reason.endswith(" begins")  # by a pass to another one: nothing rests between them
+            if not self._stop_reason and outcome.reason != "duration over" and not is_handed_over:
                 outcome = await self._rest()
         return outcome
 
@@ -333,6 +334,8 @@ class StationRuns:
         self._look_at_led(seen)
         self.day.see(seen)
         self._obey_wind(seen)
+        if (entry := self.day.interrupter(seen.tai_s)) is not None and self._service is not None:
+            self._service.hand_over(f"{entry.name} begins")
         if self._live is not None:
             self._live.show(seen)
         if math.isfinite(self._move_until_tai_s) and self._service is not None:

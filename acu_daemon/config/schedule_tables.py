@@ -50,7 +50,7 @@ class SatelliteScheduleSection(Section):
         default=DEFAULT.may_interrupt,
         description=(
             "Whether a pass that is being tracked, of a lower priority, is given up for one of this satellite.  "
-            "Decides what new elements or a person's word may change while a pass is on."
+            "Decides what a person's word may change while a pass is on."
         ),
     )
 

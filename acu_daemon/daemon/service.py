@@ -193,6 +193,10 @@ class Service:
         """End the run after the present tick, or the next one: no exchange is cut off.  Safe stop included."""
         self._stop_reason = self._stop_reason or reason
 
+    def hand_over(self, reason: str) -> None:
+        """End the run after the present tick for another, which takes the antenna as it is: no STOP between them."""
+        self.anew_reason = self.anew_reason or reason
+
     async def run(self) -> Outcome:
         """Run the pass.
 
@@ -254,7 +258,7 @@ class Service:
         sky = self._area.sky
         if why := why_over(sky, now_tai_s, self._job.end_tai_s):
             self.stop(why)
-        if self._stop_reason:
+        if self._stop_reason or self.anew_reason:
             self._is_over.set()
             return
         self._check_acu(now_tai_s - self._started_tai_s)

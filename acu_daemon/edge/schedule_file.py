@@ -146,6 +146,11 @@ class ScheduleFile:
         requests = tuple(PassRequest(satellite, at_tai_s, Wish(wish)) for satellite, at_tai_s, wish in rows)
         return Words(requests, pause[0]) if pause else Words(requests)
 
+    def words_beside(self) -> Words:
+        """The same, for another thread: by a connection of its own.  Raises: UsageError: it cannot be read."""
+        with ScheduleFile(self.path.parent, is_read_only=True) as other:
+            return other.words()
+
     def history(self, number: int) -> list[tuple[float, str, str]]:
         """Of a pass: when which state, and why."""
         return self._db.execute(
