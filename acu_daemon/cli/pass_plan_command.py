@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import cos, degrees, radians
 from pathlib import Path
 from typing import Annotated, Any
@@ -199,8 +199,11 @@ def _draw(path: Path, planned: _Planned) -> None:
     sun = None
     if bounds.sun is not None:
         sun = (*bounds.sun.direction_deg(planned.coming.culmination_tai_s), bounds.sun.radius_deg)
-    sky_deg_s = float(np.abs(np.gradient(way.path_el_deg, way.tai_s)).max())
+    on_sky = np.vectorize(replace(bounds, tilt=planned.tilt).beam_deg, otypes=[np.float64, np.float64])
+    sky_path, sky_antenna = on_sky(way.path_az_deg, way.path_el_deg), on_sky(way.antenna_az_deg, way.antenna_el_deg)
+    sky_deg_s = float(np.abs(np.gradient(sky_path[1], way.tai_s)).max())
     share = sky_deg_s / bounds.azimuth.max_rate_deg_s
+    is_keyhole = 0.0 < share < cos(radians(60.0))
     spans = [("unwinding", one.tai_s - start, one.tai_s - start + one.for_s) for one in planned.plan.unwindings]
     if (crossing := planned.plan.crossing) is not None:
         spans.append(("zenith", crossing.departure_tai_s - start, crossing.return_tai_s - start))
@@ -210,10 +213,15 @@ def _draw(path: Path, planned: _Planned) -> None:
         path,
         PlannedPicture(
             *(way.tai_s - start, way.path_az_deg, way.path_el_deg, way.antenna_az_deg, way.antenna_el_deg, way.off_deg),
-            *(bounds.azimuth, bounds.elevation, planned.half_beam_deg, station.station.min_elevation_deg),
+            sky_path_deg=sky_path,
+            sky_antenna_deg=sky_antenna,
+            azimuth=bounds.azimuth,
+            elevation=bounds.elevation,
+            half_beam_deg=planned.half_beam_deg,
+            min_elevation_deg=station.station.min_elevation_deg,
             hills=None if skyline is None else (around, np.maximum(skyline.heights_deg(around), 0.0)),
             sun_deg=sun,
-            keyhole_deg=90.0 - degrees(share) if 0.0 < share < cos(radians(60.0)) else None,
+            keyhole=on_sky(around, np.full(around.size, 90.0 - degrees(share))) if is_keyhole else None,
             spans=spans,
             begins=utc_text(start, 0),
         ),

@@ -62,28 +62,50 @@ def way_over(
     if begun is not None:
         return _made(path, half_beam_deg, *begun)
     top = path.top
-    halves = np.arange(round(1.0 / path.step_s), min(top, path.az_deg.size - 1 - top), max(1, round(0.5 / path.step_s)))
-    found: list[Over] = []
-    for half in halves[halves * path.step_s <= LONGEST_HALF_S].tolist():
-        first, last = top - half, top + half
-        by_deg = float(path.plunged_az_deg[last] - path.az_deg[first])
-        rates = float(path.az_rate_deg_s[first]), float(path.az_rate_deg_s[last])
-        if _can(by_deg, rates, 2.0 * half * path.step_s, drive):
-            times = first * path.step_s, last * path.step_s
-            one = _made(path, half_beam_deg, *times, float(path.az_deg[first]), rates[0])
-            found += [] if one is None else [one]
-    least_deg = min((one.crossing.largest_error_deg for one in found), default=0.0)
-    return next((one for one in found if one.crossing.largest_error_deg < least_deg + SURE_DEG), None)
+    most = min(top, path.az_deg.size - 1 - top, round(LONGEST_HALF_S / path.step_s))
+    halves = range(round(1.0 / path.step_s), most + 1, max(1, round(0.5 / path.step_s)))
+    ways = {half: _largest_error_deg(path, top, half) for half in halves if _can(path, top, half, drive)}
+    if not ways:
+        return None
+    least_deg = min(ways.values())
+    half = next(half for half, error_deg in ways.items() if error_deg < least_deg + SURE_DEG)
+    first, times = top - half, ((top - half) * path.step_s, (top + half) * path.step_s)
+    return _made(path, half_beam_deg, *times, float(path.az_deg[first]), float(path.az_rate_deg_s[first]))
 
 
-def _can(by: float, rates: tuple[float, float], span_s: float, drive: AxisLimits) -> bool:
-    """Whether a drive follows the cubic that goes so far, from rate to rate, easily."""
-    r0, r1 = rates
+def _ends(path: Branches, top: int, half: int) -> tuple[float, float, float, float]:
+    """Of a way that departs and returns so many samples before and after the top: span, how far, rates at its ends."""
+    first, last = top - half, top + half
+    by_deg = float(path.plunged_az_deg[last] - path.az_deg[first])
+    return 2.0 * half * path.step_s, by_deg, float(path.az_rate_deg_s[first]), float(path.az_rate_deg_s[last])
+
+
+def _can(path: Branches, top: int, half: int, drive: AxisLimits) -> bool:
+    """Whether the drive follows the cubic from place and rate to place and rate easily."""
+    span_s, by, r0, r1 = _ends(path, top, half)
     most = max(abs(6.0 * by - (4.0 * r0 + 2.0 * r1) * span_s), abs(6.0 * by - (2.0 * r0 + 4.0 * r1) * span_s))
     middle_deg_s = 1.5 * by / span_s - (r0 + r1) / 4.0
-    fastest_deg_s = max(abs(r0), abs(r1), abs(middle_deg_s))
-    is_slow = fastest_deg_s <= RATE_SHARE * drive.max_rate_deg_s
+    is_slow = max(abs(r0), abs(r1), abs(middle_deg_s)) <= RATE_SHARE * drive.max_rate_deg_s
     return is_slow and most / span_s**2 <= ACCELERATION_SHARE * drive.max_acceleration_deg_s2
+
+
+def _largest_error_deg(path: Branches, top: int, half: int) -> float:
+    span_s, by_deg, r0, r1 = _ends(path, top, half)
+    way = slice(top - half, top + half + 1)
+    az = path.az_deg[top - half] + _cubic(np.arange(2 * half + 1) / (2.0 * half), by_deg, r0 * span_s, r1 * span_s)
+    return float(_off_deg(az, path.az_deg[way], path.el_deg[way]).max())
+
+
+def _cubic(u: Array, by: float, d0: float, d1: float) -> Array:
+    """From 0 at u = 0 to by at u = 1, with these slopes there."""
+    way: Array = (((d0 + d1 - 2.0 * by) * u + 3.0 * by - 2.0 * d0 - d1) * u + d0) * u
+    return way
+
+
+def _off_deg(antenna_az_deg: Array, az_deg: Array, el_deg: Array) -> Array:
+    """How far a direction is off the nearest point of an antenna's meridian, which goes over the top."""
+    off: Array = np.degrees(np.abs(np.arcsin(np.cos(np.radians(el_deg)) * np.sin(np.radians(antenna_az_deg - az_deg)))))
+    return off
 
 
 def _made(
@@ -96,12 +118,13 @@ def _made(
     time_s = step_s * np.arange(size)
     span_s = to_s - from_s
     u = np.clip((time_s - from_s) / span_s, 0.0, 1.0)
-    by, d0, d1 = path.plunged_az_deg[last] - from_az_deg, from_rate_deg_s * span_s, path.az_rate_deg_s[last] * span_s
+    by = float(path.plunged_az_deg[last]) - from_az_deg
+    d0, d1 = from_rate_deg_s * span_s, float(path.az_rate_deg_s[last]) * span_s
     a, b = d0 + d1 - 2.0 * by, 3.0 * by - 2.0 * d0 - d1
     is_way = (time_s > from_s + 1e-9) & (time_s < to_s - 1e-9)
     is_after = time_s >= to_s - 1e-9
     az = np.where(is_after, path.plunged_az_deg, path.az_deg)
-    az = np.where(is_way, ((a * u + b) * u + d0) * u + from_az_deg, az)
+    az = np.where(is_way, from_az_deg + _cubic(u, by, d0, d1), az)
     az_rate = np.where(is_way, ((3.0 * a * u + 2.0 * b) * u + d0) / span_s, path.az_rate_deg_s)
     missing, true_el = np.radians(az - path.az_deg), np.radians(path.el_deg)
     nearest = np.degrees(np.arctan2(np.sin(true_el), np.cos(true_el) * np.cos(missing)))
@@ -109,8 +132,7 @@ def _made(
     el = np.where(is_way, nearest, np.where(is_after, path.plunged_el_deg, path.el_deg))
     el_rate = np.where(is_after, -path.el_rate_deg_s, path.el_rate_deg_s)
     el_rate = np.where(is_way, np.gradient(el, step_s), el_rate)
-    off_deg = np.degrees(np.abs(np.arcsin(np.cos(true_el) * np.sin(missing))))
-    off_deg = np.where(is_way, off_deg, 0.0)
+    off_deg = np.where(is_way, _off_deg(az, path.az_deg, path.el_deg), 0.0)
     lost = np.flatnonzero(off_deg > half_beam_deg)
     crossing = ZenithCrossing(
         departure_tai_s=from_s,

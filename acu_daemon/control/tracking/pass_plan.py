@@ -1,6 +1,6 @@
 """The plan of a pass: where to stand, on which turn of the wrap, when it is due, and when the pass ends.  Pure."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import isfinite
 
@@ -118,8 +118,9 @@ def plan_pass(
     crossing = crossing_of(az_deg + turns.offset_deg, 0)
     if crossing is not None and crossing.is_plunge:
         az_deg, el_deg = _beyond_top(propagator, tai_s, site, az_deg, el_deg)
-        turns = on_turns(az_deg)
-        crossing = crossing_of(az_deg + turns.offset_deg, 0)
+        before_deg, turns = turns.offset_deg, on_turns(az_deg)
+        departure_az_deg = crossing.departure_az_deg + turns.offset_deg - before_deg
+        crossing = replace(crossing, departure_az_deg=departure_az_deg)
     elif turns.unwindings and crossing is not None:
         rising = 1 if az_deg[-1] > az_deg[0] else -1
         other_az_deg = turned_past_zenith(az_deg, np.gradient(az_deg, step_s), -rising)
