@@ -228,10 +228,27 @@ def test_a_stop_is_always_obeyed_and_by_who_leads_it_only_lets_the_antenna_stand
     bench.grant()
     bench.said(b"P 10 20")
     assert bench.said(b"S") == b"RPRT 0\n"
-    assert bench.antenna.led[-1] == (None, None, 30.0, PEER)
+    assert bench.antenna.led[-1] == (None, None, 30.0, "Gpredict")
     bench.now_s = 2.0
     bench.said(b"SA SE", "10.0.0.9")
     assert len(bench.antenna.stops) == 2
+
+
+def test_who_has_the_lease_and_leads_nothing_yet_has_the_antenna_stand_too() -> None:
+    bench = Bench()
+    bench.grant()
+    assert bench.said(b"S") == b"RPRT 0\n"
+    assert (bench.antenna.led, bench.antenna.stops) == ([(None, None, 30.0, "Gpredict")], [])
+
+
+def test_where_only_the_lease_stops_others_are_answered_and_nothing_happens() -> None:
+    bench = Bench()
+    bench.port = RotctldPort(bench.antenna, bench.lease, lambda: bench.now_s, may_anyone_stop=False)
+    assert bench.said(b"S") == b"RPRT 0\n"
+    assert (bench.antenna.led, bench.antenna.stops) == ([], [])
+    bench.grant()
+    assert bench.said(b"S") == b"RPRT 0\n"
+    assert bench.antenna.led[-1][:2] == (None, None)
 
 
 def test_easycomm_points_asks_and_stops() -> None:

@@ -82,7 +82,12 @@ class Outlets:
 
             seen = DaemonSeen(self.tally, self._clock, self._current, lambda line, who: self._answer(line, who))
             self._antenna = LedAntenna(self._station, seen)
-            self._rotctld = RotctldPort(self._antenna, self.lease, self._clock.monotonic_s)
+            self._rotctld = RotctldPort(
+                self._antenna,
+                self.lease,
+                self._clock.monotonic_s,
+                may_anyone_stop=self._station.rotctld.stop == "anyone",
+            )
             await self._rotctld.open(*address)
 
     def _publish(self, host: str, port: int, is_tls: bool) -> None:

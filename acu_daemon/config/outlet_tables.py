@@ -1,6 +1,7 @@
 """[metrics], [rotctld] and [mqtt] of station.toml: what other programs are told, and where."""
 
 import ipaddress
+from typing import Literal
 from urllib.parse import urlsplit
 
 from pydantic import Field, field_validator, model_validator
@@ -51,6 +52,14 @@ class RotctldSection(Section):
         description=(
             "Where programs for rotators find the antenna, such as 127.0.0.1:4533, in Hamlib's protocol.  Decides "
             "whether there is such a port; who may lead the antenna by it is a person's word (docs/rotctld.md)."
+        ),
+    )
+
+    stop: Literal["anyone", "lease"] = Field(
+        default="anyone",
+        description=(
+            "Whose `S` stops the antenna: anyone's, as STOP and disarmed until a person arms again, or only that of "
+            "who has the write lease, such as where programs send it without being asked to.  Decides that."
         ),
     )
 

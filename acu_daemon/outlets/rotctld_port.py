@@ -70,8 +70,12 @@ def key_of(address: str) -> str:
 class RotctldPort:
     """Owned by the loop."""
 
-    def __init__(self, antenna: AntennaBeside, lease: WriteLease, now_s: Callable[[], float]) -> None:
+    def __init__(
+        self, antenna: AntennaBeside, lease: WriteLease, now_s: Callable[[], float], *, may_anyone_stop: bool = True
+    ) -> None:
+        """may_anyone_stop: S stops the antenna whoever says it; else only who has the lease stops anything by it."""
         self._antenna, self._lease, self._now_s = antenna, lease, now_s
+        self._may_anyone_stop = may_anyone_stop
         self._server: asyncio.Server | None = None
         self._clients: list[_Client] = []
         self._stopped_s: dict[str, float] = {}
@@ -195,10 +199,13 @@ class RotctldPort:
         return OK
 
     def _stop(self, peer: str) -> None:
-        """Whose word the antenna follows lets it stand and goes on to have it; all others stop it altogether."""
-        if self._leading == key_of(peer) and self._lease.use(self._leading):
-            self._antenna.lead(None, None, self._lease.left_s(), peer)
-        elif self._now_s() - self._stopped_s.get(peer, float("-inf")) >= STOP_AGAIN_S:
+        """Who has the lease has the antenna stand, and keeps it; all others stop it altogether, where they may."""
+        key = key_of(peer)
+        held = self._lease.held if self._lease.use(key) else None
+        if held is not None:
+            if not self._antenna.lead(None, None, self._lease.left_s(), held.claim.reason or peer):
+                self._leading = key
+        elif self._may_anyone_stop and self._now_s() - self._stopped_s.get(peer, float("-inf")) >= STOP_AGAIN_S:
             self._stopped_s = {peer: self._now_s()}
             self._antenna.stop(f"rotctl from {peer}")
 

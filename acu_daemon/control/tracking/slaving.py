@@ -30,6 +30,8 @@ def take_slaving(state: ControlState, given: TickInput, config: ControlConfig, e
             slaved = Slaved(asking, until_tai_s, slaved.has_led) if asking.lasts_s > 0.0 else Slaved()
     if slaved.wish is not None and not slaved.has_led and state.tracking.track is TrackState.SLAVED:
         slaved = replace(slaved, has_led=True)
+    if before.wish is not None and slaved.wish is None:
+        events.append(Event("slaved.ends", {"by": before.wish.by, "reason": "the lease is over"}))
     if slaved.wish is not None and (why := _why_over(state, slaved, given.now_tai_s, config)):
         events.append(Event("slaved.ends", {"by": slaved.wish.by, "reason": why}))
         slaved = Slaved()
