@@ -101,6 +101,28 @@ def test_the_unit_restarts_for_ever_but_not_after_a_refused_configuration() -> N
     assert directives["RestartPreventExitStatus"] == ["2"]
 
 
+STATION = UNIT.parent / "acu-daemon@station.service.d" / "station.conf"
+DROP_INS = sorted((UNIT.parent / "drop-ins").glob("*.conf"))
+
+
+def test_the_station_is_the_unit_without_a_satellite_and_reads_its_files_again_when_it_is_told() -> None:
+    directives, unit = read_unit(STATION), read_unit()
+    assert directives["ExecStart"] == ["", unit["ExecStart"][0].removesuffix(" --satellite ${ACU_SATELLITE}")]
+    assert directives["ExecReload"] == ["/usr/bin/kill -HUP $MAINPID"]
+
+
+@pytest.mark.parametrize("drop_in", [STATION, *DROP_INS], ids=lambda path: path.name)
+def test_a_drop_in_is_well_formed_and_loosens_only_what_it_says(unit: Path, drop_in: Path) -> None:
+    folder = unit.with_name(f"{unit.name}.d")
+    folder.mkdir()
+    shutil.copy(drop_in, folder)
+    done = subprocess.run(["systemd-analyze", "verify", unit], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    allowed = {"ReadWritePaths", "DeviceAllow", "RestrictAddressFamilies", "IPAddressAllow"}
+    told = {"Description", "ExecStart", "ExecReload"}
+    assert set(read_unit(drop_in)) <= (told if drop_in == STATION else allowed)
+
+
 # when the antenna is stopped from outside
 
 
