@@ -23,6 +23,8 @@ from acu_daemon.edge.tape_file import TapeFile
 from acu_daemon.edge.writer import Job, Writer
 from acu_daemon.errors import AcuDaemonError, UsageError
 
+Reporter = Callable[[TapeFile, Writer, Path], Coroutine[Any, Any, None]]
+
 
 @dataclass(frozen=True, slots=True)
 class StationSetup:
@@ -42,7 +44,7 @@ class StationSetup:
     has_phantom: bool = True
     check: Check | None = None  # of a satellite at a TAI; None: as `acu-daemon check`
     is_recording: bool = True  # what [recording] of station.toml asks for
-    report: Callable[[TapeFile, Writer, Path], Coroutine[Any, Any, None]] = report_after
+    report: Reporter = report_after
     make_runner: Callable[[PassJob], FitRunner] = lambda job: ProcessFitRunner(
         job.refit, fit_deadline_s(job.low_water_s)
     )

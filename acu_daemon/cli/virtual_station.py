@@ -10,12 +10,13 @@ from typing import Any
 from acu_daemon.acu.commands import AcuMode
 from acu_daemon.cli.simulated import tilt_of
 from acu_daemon.cli.station_runs import StationRuns
-from acu_daemon.cli.station_setup import StationSetup, first_usable
+from acu_daemon.cli.station_setup import Reporter, StationSetup, first_usable
 from acu_daemon.cli.virtual_pass import events_to
 from acu_daemon.daemon.service import Outcome, PassJob
 from acu_daemon.drivers.sa3842.codec import address_byte
 from acu_daemon.edge.clock import LoopClock
 from acu_daemon.edge.fit import InlineFitRunner
+from acu_daemon.edge.tape_file import TapeFile
 from acu_daemon.edge.writer import Writer
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.build import make_sky
@@ -91,10 +92,12 @@ def run_days(
     errors: SkyErrors = ERRORS,
     has_phantom: bool = False,
     keeps_rows: bool = True,
+    report: Reporter | None = None,
 ) -> Days:
     """Run the station from one TAI to another; directory: its state.  script: what happens, each at its TAI.
 
     A script that raises KilledError ends the run there.  keeps_rows: fifty of them a second, too many for a week.
+    report: what makes the reports; with it passes are recorded too.
     """
     days = Days()
 
@@ -126,7 +129,7 @@ def run_days(
             sky.turn_to(job)
             return InlineFitRunner(job.refit)
 
-        files = Writer("files")
+        files = Writer("files", math.inf)
         setup = StationSetup(
             config,
             clock,
@@ -138,7 +141,8 @@ def run_days(
             beside=beside,
             make_runner=runner,
             check=check,
-            is_recording=False,
+            is_recording=report is not None,
+            report=report or no_report,
             has_phantom=has_phantom,
         )
         runs = StationRuns(setup, first, None)
@@ -160,6 +164,10 @@ def run_days(
     with events_to(days.events):
         run_virtual(main())
     return days
+
+
+async def no_report(_tape: TapeFile, _files: Writer, _config: Path) -> None:
+    """Make none."""
 
 
 def loop_future() -> "asyncio.Future[Any]":
