@@ -191,6 +191,7 @@ def test_old_recordings_and_the_oldest_of_too_many_are_removed_and_told(tmp_path
     for name, days, size in (("a", 40.0, 1000), ("b", 3.0, 500_000), ("c", 2.0, 400_000), ("d", 1.0, 400_000)):
         aged(tmp_path, name, days, size)
     (tmp_path / "a.html").write_text("stays")
+    (tmp_path / "a.tdm").write_text("goes")
     with capture_logs() as logs:
         gone = remove_old(tmp_path, KeepRules(30.0, 1.0), 1e9)
     assert [path.name[0] for path in gone] == ["a", "b"]

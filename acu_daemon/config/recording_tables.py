@@ -17,13 +17,13 @@ class RecordingSection(Section):
         default=90.0,
         ge=1,
         le=36500,
-        description="Recordings that are older are removed when a pass begins.  Decides that; reports stay.",
+        description="Older recordings and messages are removed when a pass begins.  Decides that; reports stay.",
     )
     keep_mb: float = Field(
         default=1000.0,
         ge=1,
         le=1e7,
-        description="More than this of recordings is not kept, the oldest go first.  Decides the same.",
+        description="More than this of them is not kept, the oldest go first.  Decides the same.",
     )
     report: bool = Field(
         default=True,

@@ -15,6 +15,7 @@ from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.units import DAY_S
 
 _LONGEST_NAME = 40
+MESSAGES = (".tdm", ".omm", ".oem")  # of the pass, which go with its recording
 PASSES = "passes"  # the folder in a state directory
 
 
@@ -38,19 +39,20 @@ def safe_name(satellite: str) -> str:
 
 
 def remove_old(directory: Path, rules: KeepRules, now_unix_s: float | None = None) -> list[Path]:
-    """Remove the recordings that are too old or too many, the oldest first, and say so in the log."""
+    """Remove the recordings that are too old or too many, with their messages, the oldest first; told in the log."""
     now_s = time.time() if now_unix_s is None else now_unix_s
     found: list[tuple[float, int, Path]] = []
     for path in tapes_in(directory):
         with contextlib.suppress(OSError):
             stat = path.stat()
-            found.append((stat.st_mtime, stat.st_size, path))
+            found.append((stat.st_mtime, stat.st_size + sum(map(_size, messages_beside(path))), path))
     removed, why = _too_old_or_many(sorted(found), rules, now_s)
     log: Any = structlog.get_logger("tape")
     gone = []
     for path in removed:
         try:
-            path.unlink()
+            for one in (*messages_beside(path), path):
+                one.unlink()
         except OSError as error:
             log.warning("tape.not_removed", file=str(path), reason=error.strerror or str(error))
         else:
@@ -58,6 +60,16 @@ def remove_old(directory: Path, rules: KeepRules, now_unix_s: float | None = Non
     if gone:
         log.info("tape.removed", count=len(gone), newest=gone[-1].name, reason=why)
     return gone
+
+
+def messages_beside(tape: Path) -> list[Path]:
+    """The messages of a recording's pass."""
+    name = tape.name.removesuffix(SUFFIX)
+    return [path for path in (tape.with_name(name + ending) for ending in MESSAGES) if path.exists()]
+
+
+def _size(path: Path) -> int:
+    return path.stat().st_size
 
 
 def _too_old_or_many(
