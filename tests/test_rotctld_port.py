@@ -26,6 +26,7 @@ from acu_daemon.control.tracking.slaving import take_slaving
 from acu_daemon.daemon.tally import RunFigures, Tally
 from acu_daemon.daemon.write_lease import WriteLease
 from acu_daemon.edge.clock import LoopClock
+from acu_daemon.edge.tape_text import TapeReader, TapeWriter
 from acu_daemon.outlets.rotctld_lines import RotctlVerb, understood_line
 from acu_daemon.outlets.rotctld_port import MOST_CLIENTS, MOST_UNREAD_BYTES, PlaceShown, RotctldPort, _Client, key_of
 from acu_daemon.sim.scenario import Scenario
@@ -520,6 +521,12 @@ def test_into_a_keep_out_it_is_not_led() -> None:
 def test_what_is_no_direction_is_left_out(wish: SlaveWish) -> None:
     given = TickInput(Observation(requests=(wish,)), Sky(), 100.0)
     assert take_slaving(ControlState(), given, CONFIG, []).slaved == Slaved()
+
+
+def test_what_a_program_says_is_on_the_tape_of_a_pass_and_read_back() -> None:
+    record = ("T", 100.0, 0.0, True, (SlaveWish(1.5, 2.5, 30.0, "Gpredict"), SlaveWish(None, None, 0.0)), None)
+    [read] = TapeReader().records([TapeWriter().line(record)])
+    assert read[4] == record[4]
 
 
 # The daemon beside it

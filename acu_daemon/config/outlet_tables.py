@@ -1,26 +1,11 @@
 """[metrics], [rotctld] and [mqtt] of station.toml: what other programs are told, and where."""
 
-import ipaddress
 from typing import Literal
 from urllib.parse import urlsplit
 
 from pydantic import Field, field_validator, model_validator
 
-from acu_daemon.config.section import Name, Section
-
-
-def address_of(text: str, example: str) -> tuple[str, int]:
-    """Address and port of ADDRESS:PORT.  ValueError: it is none; example: one that is."""
-    host, _, port = text.rpartition(":")
-    host = host.strip("[]")
-    try:
-        ipaddress.ip_address(host)
-        number = int(port) if port.isdecimal() else -1
-    except ValueError:
-        number = -1
-    if not 0 <= number <= 65535:
-        raise ValueError(f"expected ADDRESS:PORT in numbers, such as {example}")
-    return host, number
+from acu_daemon.config.section import Name, Section, address_of
 
 
 class MetricsSection(Section):

@@ -1,5 +1,6 @@
 """What every table of a TOML file has in common, and the kinds of values that several have."""
 
+import ipaddress
 from datetime import UTC, datetime
 from typing import Annotated
 
@@ -21,6 +22,20 @@ def _tai(value: object) -> float:
 UtcTime = Annotated[float, BeforeValidator(_tai)]
 Positive = Annotated[float, Field(gt=0)]
 Name = Annotated[str, Field(min_length=1)]
+
+
+def address_of(text: str, example: str) -> tuple[str, int]:
+    """Address and port of `ADDRESS:PORT`, in numbers.  ValueError: it is none; example: one that is."""
+    host, _, port = text.rpartition(":")
+    host = host.strip("[]")
+    try:
+        ipaddress.ip_address(host)
+        number = int(port) if port.isdecimal() else -1
+    except ValueError:
+        number = -1
+    if not 0 <= number <= 65535:
+        raise ValueError(f"expected ADDRESS:PORT in numbers, such as {example}")
+    return host, number
 
 
 class Section(BaseModel):

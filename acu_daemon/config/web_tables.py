@@ -1,22 +1,13 @@
 """[web] of station.toml: the operator's page, where it listens and who may order."""
 
-import ipaddress
-
 from pydantic import Field, field_validator
 
-from acu_daemon.config.section import Name, Section
+from acu_daemon.config.section import Name, Section, address_of
 
 
 def check_listen(text: str) -> tuple[str, int]:
     """Address and port of `ADDRESS:PORT`.  ValueError: says what was expected."""
-    host, _, port = text.rpartition(":")
-    try:
-        ipaddress.ip_address(host.strip("[]"))
-    except ValueError:
-        raise ValueError("expected ADDRESS:PORT in numbers, such as 127.0.0.1:8642") from None
-    if not port.isdecimal() or int(port) > 65535:
-        raise ValueError("expected ADDRESS:PORT in numbers, such as 127.0.0.1:8642")
-    return host.strip("[]"), int(port)
+    return address_of(text, "127.0.0.1:8642")
 
 
 class WebSection(Section):
