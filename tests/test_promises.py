@@ -12,6 +12,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
@@ -19,6 +20,8 @@ from promise_judge import SPOILING
 from promise_rig import HANDS, Rig, demo_scene
 
 from acu_daemon.sim.fault_verbs import FRAME_VERBS, PEDESTAL_VERBS, VERBS, VerbName
+
+pytestmark = pytest.mark.long
 
 PROMISES = tuple(f"P{number}" for number in range(1, 11))
 LINE_VERBS = frozenset(VERBS) - FRAME_VERBS - PEDESTAL_VERBS

@@ -16,6 +16,8 @@ from acu_daemon.orbit.passes import find_passes
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator
 from acu_daemon.orbit.tle import parse_tle
 
+pytestmark = pytest.mark.long
+
 SIGMA_DEG = 0.03
 WORST_REAL_DEG = 0.06  # of the 0.1 deg allowed; drive and staircase take the rest
 LOSSES = [(0.6, 1.0), (0.4, 0.75)]

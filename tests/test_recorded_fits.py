@@ -5,6 +5,8 @@ from functools import cache
 import pytest
 from recorded_fits import RECORDED, RUNS, lines
 
+pytestmark = pytest.mark.long
+
 SHARE, LEAST = 0.003, 1e-9  # by which figures may differ from machine to machine
 
 

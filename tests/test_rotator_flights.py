@@ -23,6 +23,8 @@ from acu_daemon.sim.scenario import Scenario, SkyErrors
 from acu_daemon.sim.sky import SimulatedSky
 from acu_daemon.units import wrap_180
 
+pytestmark = pytest.mark.long
+
 NOAA_20 = """
 [satellite]
 name = "NOAA 20"

@@ -17,7 +17,7 @@ from acu_daemon.edge.fit import InlineFitRunner
 from acu_daemon.sim.scenario import Scenario, read_scenario
 
 pass_rig = load("pass_rig")
-pytestmark = needs_data
+pytestmark = [needs_data, pytest.mark.long]
 BYTE_TIME_S = 10 / 9600
 MAX_ERROR_DEG = 0.1
 TRACKED_S = 16.0  # before the loss of the scenario

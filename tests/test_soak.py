@@ -5,6 +5,8 @@ import json
 import pytest
 from script_modules import load
 
+pytestmark = pytest.mark.long
+
 soak = load("soak")
 LEAK_SHARE = 0.25  # allocations that a pass may leave, for each tick; half of the ticks are its own
 

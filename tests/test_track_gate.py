@@ -27,6 +27,8 @@ from acu_daemon.orbit.look import look_at
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator
 from acu_daemon.orbit.tle import parse_tle
 
+pytestmark = pytest.mark.long
+
 SIGMA_DEG = 0.03
 AZIMUTH = AxisLimits(-270.0, 270.0, 20.0, 10.0)
 ELEVATION = AxisLimits(0.0, 90.0, 5.0, 5.0)

@@ -28,6 +28,8 @@ from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.scenario import AcuChoice
 from acu_daemon.units import wrap_180
 
+pytestmark = pytest.mark.long
+
 MOVING = (WriteAndPoll, WriteRegisters, SelectMode, Stop)
 T = RISING_TAI_S
 LSB_DEG = 360.0 / 65536

@@ -33,6 +33,8 @@ from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.pointing.keyhole import KeyholeRules, SkyPath, follow_path
 from acu_daemon.sim.scenario import AcuChoice, Encoder, Scenario, SkyErrors
 
+pytestmark = pytest.mark.long
+
 LEAD_S = 30.0
 LOSS_SHARES = (0.25, 0.37)
 HALF_BEAM_DEG = 0.5

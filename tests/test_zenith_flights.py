@@ -20,6 +20,8 @@ from acu_daemon.orbit.look import look_at
 from acu_daemon.sim.build import make_sky
 from acu_daemon.sim.scenario import AcuChoice, Scenario, SkyErrors
 
+pytestmark = pytest.mark.long
+
 SHORT = {"before_s": 30.0, "after_s": 16.0}
 
 
