@@ -4,17 +4,22 @@ import asyncio
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 from acu_daemon.acu.driver import AcuDriver
 from acu_daemon.cli.options import Target, coming_pass
 from acu_daemon.cli.run_setup import make_job
+from acu_daemon.cli.tape_head import head_of
 from acu_daemon.cli.virtual_pass import events_to
 from acu_daemon.daemon.service import Outcome, Service, SignalSource
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.edge.arrivals import Arrivals
 from acu_daemon.edge.clock import Clock, LoopClock
 from acu_daemon.edge.fit import InlineFitRunner
+from acu_daemon.edge.tape import no_note
+from acu_daemon.edge.tape_file import TapeFile
+from acu_daemon.edge.writer import Writer
 from acu_daemon.errors import LinkError, LinkRefusedError
 from acu_daemon.model import Reading
 from acu_daemon.sim.virtual import run_virtual
@@ -185,10 +190,12 @@ def fly_rotator(
     is_rehearsal: bool = True,
     driver: AcuDriver | None = None,
     signal: SignalSource | None = None,
+    tape: Path | None = None,
 ) -> RotatorFlight:
     """Run the daemon on a pass in virtual time.  script: what happens, in seconds from the beginning.
 
     driver: of another ACU that speaks in lines, as `rotator` does then; by default that of rotctld.
+    tape: a file to record the pass in.
     """
     flight, habits = RotatorFlight(rotator), habits or Habits()
 
@@ -209,11 +216,14 @@ def fly_rotator(
             flight.snapshots.append(seen)
             flight.to_fit_count += len(service._area.to_fit)
 
+        files = Writer("tape", math.inf)
+        kept = None if tape is None else TapeFile(tape, head_of(target, job, link, begin_tai_s), files)
         service = Service(
             job,
             link,
             clock,
             InlineFitRunner(job.refit),
+            note=no_note if kept is None else kept.note,
             on_snapshot=look,
             on_reading=flight.readings.append,
             signal=signal,
@@ -221,6 +231,9 @@ def fly_rotator(
         for at_s, action in script:
             asyncio.get_running_loop().call_later(at_s, action, link, habits, service)
         flight.outcome = await service.run()
+        if kept is not None:
+            kept.close()
+        files.close()
 
     with events_to(flight.events):
         run_virtual(main())

@@ -23,6 +23,7 @@ from test_live_line import SEEN
 from test_rotator_flights import STATION, brouwer, mid_pass
 
 from acu_daemon.cli.options import load_target
+from acu_daemon.cli.replay_wire import replay_pass
 from acu_daemon.cli.virtual_pass import fly
 from acu_daemon.config.load import load_station
 from acu_daemon.control.receiver_signal import ReceiverSignal, SignalRules, SignalSample, judge_signal
@@ -30,6 +31,7 @@ from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.daemon.goal import Goal, is_reached
 from acu_daemon.daemon.overview import status_rows
 from acu_daemon.edge.signal_reader import SignalReader, signal_of
+from acu_daemon.edge.tape_file import SUFFIX
 from acu_daemon.errors import ConfigError
 from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.sim.scenario import Scenario
@@ -176,7 +178,9 @@ def test_a_rotator_with_a_receiver_shows_lock_and_loss_and_makes_no_fit(tmp_path
         return 12.0 if 30.0 <= second < 50.0 or second >= 80.0 else 1.0
 
     told = Told(begin, says)
-    flight = fly_rotator(target, Rotator(place=[200.0, 30.0]), begin, begin + 100.0, signal=told)
+    tape = tmp_path / f"rotator{SUFFIX}"
+    flight = fly_rotator(target, Rotator(place=[200.0, 30.0]), begin, begin + 100.0, signal=told, tape=tape)
+    assert replay_pass(tape).difference is None
     assert flight.states() == ["IDLE", "PREPOSITION", "PROGRAM"]
     at = {round(seen.tai_s - begin, 1): seen for seen in flight.snapshots}
     assert [at[t].verdict for t in (29.0, 35.0, 60.0, 75.0, 90.0)] == [

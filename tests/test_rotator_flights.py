@@ -15,6 +15,8 @@ from tagged_driver import TaggedDriver
 
 from acu_daemon.assist.mount_model import encoder_look
 from acu_daemon.cli.options import Target, coming_pass, load_target
+from acu_daemon.cli.replay_wire import replay_pass
+from acu_daemon.edge.tape_file import SUFFIX
 from acu_daemon.errors import UsageError
 from acu_daemon.model import sky_angle_deg
 from acu_daemon.orbit.timescales import tai_from_utc
@@ -110,7 +112,9 @@ def test_p2_a_rotctld_that_is_slow_or_splits_its_answers_is_followed_without_an_
     begin = mid_pass(target)
     path = encoder_look(target.elements.propagator, np.array([begin]), target.station.site, None)
     rotator = Rotator(place=[float(path.az_deg[0]), float(path.el_deg[0])])
-    flight = fly_rotator(target, rotator, begin, begin + 60.0, habits=habits)
+    tape = tmp_path / f"rotator{SUFFIX}"
+    flight = fly_rotator(target, rotator, begin, begin + 60.0, habits=habits, tape=tape)
+    assert replay_pass(tape).difference is None
     assert flight.states()[:3] == ["IDLE", "PREPOSITION", "PROGRAM"]
     assert flight.named("link.lost") == []
     assert off_deg(flight, target, begin + 20.0, begin + 60.0).max() < 2.0 * DEAD_BAND_DEG

@@ -88,6 +88,19 @@ def test_another_decision_is_told_with_its_first_tick_and_exit_status_1(tmp_path
     assert "PointAndPoll" in done.err
 
 
+def test_the_safe_stop_at_the_end_is_replayed_too(tmp_path: Path) -> None:
+    def otherwise(lines: list[str]) -> list[str]:
+        end = lines.index("E{}")
+        stop = next(k for k in range(end, len(lines)) if lines[k].startswith("X") and lines[k - 1][0] != "Q")
+        lines[stop] = lines[stop][:-1] + "f"
+        return lines
+
+    path = changed(path_of("local-panel"), tmp_path / f"stop{SUFFIX}", otherwise)
+    difference = replay_pass(path).difference
+    assert difference is not None
+    assert difference.replayed.endswith("(Stop)")
+
+
 def test_a_recording_of_a_pass_says_that_all_is_the_same() -> None:
     done = acu_daemon("replay", "--wire", path_of("latch"))
     assert (done.code, done.out[:26]) == (0, "every decision is the same")

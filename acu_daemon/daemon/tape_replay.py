@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from acu_daemon.acu.commands import Command, PointAndPoll, PointAt, Poll, command_text
+from acu_daemon.acu.commands import Command, PointAndPoll, PointAt, Poll, SetWatchdog, Stop, command_text
 from acu_daemon.acu.replies import Done, Reply
 from acu_daemon.assist.session.refit import RefitReply, RefitRequest, Refitter, before_fit, predict_from
 from acu_daemon.control.hear import Heard
@@ -84,12 +84,16 @@ class TapeReplay:
         self.tick_count = self.command_count = self.fit_count = 0
         self.difference: Difference | None = None
         self.is_ended = False
+        self._is_question = self._is_stopped = False  # in the safe stop
 
     def run(self, records: Iterable[Record]) -> Difference | None:
-        """Replay until the run's end or the first difference, which is returned.  Facts for a report may come later."""
+        """Replay until the recording's end or the first difference, which is returned.
+
+        After the run's end come the commands of the safe stop (daemon.stopping), and facts for a report.
+        """
         for record in records:
-            if self.is_ended and record[0] != "I":
-                continue
+            if self.is_ended:
+                self._mean_of_stop(record)
             self._take(record)
             if self.difference is not None:
                 break
@@ -182,6 +186,15 @@ class TapeReplay:
         else:
             self._differ("a second command", "none")
 
+    def _mean_of_stop(self, record: Record) -> None:
+        """What is no question is STOP, and once that is acknowledged the end of the register watchdog."""
+        if record[0] == "Q":
+            self._is_question = True
+        elif record[0] == "X":
+            if not self._is_question:
+                self._mean(SetWatchdog(0.0) if self._is_stopped else Stop())
+            self._is_question = False
+
     def _mean(self, command: Command) -> None:
         self._meant = self._next = command
         if isinstance(command, PointAndPoll) and not self._job.driver.capabilities.has_combined_write:
@@ -218,6 +231,7 @@ class TapeReplay:
             return
         is_sure = self._job.driver.is_sure
         self._answer = replace(self._answer, reply=reply, first_byte_tai_s=self._first_byte_tai_s, is_sure=is_sure)
+        self._is_stopped = self._is_stopped or (self.is_ended and isinstance(self._sent, Stop) and reply == Done())
         if isinstance(self._sent, PointAt) and isinstance(self._meant, PointAndPoll) and isinstance(reply, Done):
             self._next = Poll()
 
