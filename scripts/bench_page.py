@@ -4,8 +4,8 @@
 What it does
   Flies the demo's pass on a simulated ACU, the page served, and measures: how soon the page is painted and shows a
   state; how old a state is when it is drawn; from a press of STOP to STOP on the wire; and how late the ticks come, in
-  turns of some seconds with nobody looking and with Chromium and five light pages, so that what else the machine does
-  is in both.
+  turns of some seconds with nobody looking, with Chromium and five light pages, and attacked: slow requests, requests
+  of another site, guessed tokens and nonsense, as fast as it lets them in.  So what else the machine does is in all.
 
 Prints a Markdown table, asked and measured.
 
@@ -39,6 +39,7 @@ from acu_daemon.web.page_server import page_files
 
 WINDOW_S = 600.0
 LIGHT_COUNT = 5
+ALONE, WATCHED, ATTACKED = "nobody looks", f"Chromium and {LIGHT_COUNT} light pages", "Chromium, and attacked"
 NOTE_PRESS = """(() => {
 const button = document.querySelector("#stop");
 button.onpointerdown = (event) => { window.pressed = performance.timeOrigin + event.timeStamp; };
@@ -136,27 +137,69 @@ async def light_pages(page: str) -> AsyncIterator[None]:
             await asyncio.gather(*looking, return_exceptions=True)
 
 
+@contextlib.asynccontextmanager
+async def attack(page: str) -> AsyncIterator[None]:
+    port = int(page.rstrip("/").rpartition(":")[2])
+
+    async def slow() -> None:
+        while True:
+            with contextlib.suppress(OSError):
+                reader, writer = await asyncio.open_connection("127.0.0.1", port)
+                writer.write(b"GET / HTTP/1.1\r\nX-")
+                await reader.read()
+                writer.close()
+
+    async def foreign() -> None:
+        while True:
+            with contextlib.suppress(OSError, aiohttp.ClientError):
+                async with aiohttp.ClientSession() as session:
+                    await session.post(f"{page}stop", json={}, headers={"Origin": "http://evil.example"})
+
+    async def guess() -> None:
+        while True:
+            with contextlib.suppress(OSError, aiohttp.ClientError):
+                async with (
+                    aiohttp.ClientSession() as session,
+                    session.ws_connect(f"{page}live", headers={"Origin": page.rstrip("/")}) as socket,
+                ):
+                    while not socket.closed:
+                        await socket.send_json({"order": '{"n":1}', "seal": "0"})
+                        await socket.receive()
+
+    attacking = [asyncio.create_task(one()) for one in (*[slow] * 30, *[foreign] * 4, *[guess] * 4)]
+    try:
+        yield
+    finally:
+        for one in attacking:
+            one.cancel()
+        await asyncio.gather(*attacking, return_exceptions=True)
+
+
 async def ticks(new_tab: Any, page: str, rig: Rig, turns: int, seconds: float) -> list[Row]:
-    alone: list[float] = []
-    watched: list[float] = []
+    late: dict[str, list[float]] = {ALONE: [], WATCHED: [], ATTACKED: []}
     for turn in range(turns):
-        if turn % 2 == 0:
-            alone += await late_ms(rig, seconds)
+        kind = list(late)[turn % 3]
+        if kind == ALONE:
+            late[kind] += await late_ms(rig, seconds)
             continue
         tab = await new_tab()
         await tab.open(page)
         await tab.until("window.acuShown")
-        async with light_pages(page):
+        async with light_pages(page) if kind == WATCHED else attack(page):
             await asyncio.sleep(1.0)
-            watched += await late_ms(rig, seconds)
+            late[kind] += await late_ms(rig, seconds)
         await tab.end()
     rows: list[Row] = []
     for share, most in ((50, None), (99, 2.0)):
-        rows.append((f"ticks late {share} %, nobody looks, ms", percentile(alone, share), None))
-        rows.append(
-            (f"ticks late {share} %, Chromium and {LIGHT_COUNT} light pages, ms", percentile(watched, share), most)
-        )
-    return [*rows, ("ratio of the 99 %", percentile(watched, 99) / percentile(alone, 99), None)]
+        for kind, values in late.items():
+            rows.append(
+                (f"ticks late {share} %, {kind}, ms", percentile(values, share), None if kind == ALONE else most)
+            )
+    alone = percentile(late[ALONE], 99)
+    return [
+        *rows,
+        *((f"ratio of the 99 %, {kind}", percentile(late[kind], 99) / alone, None) for kind in (WATCHED, ATTACKED)),
+    ]
 
 
 def percentile(values: Sequence[float], share: float) -> float:

@@ -302,6 +302,17 @@ async def test_a_flood_of_messages_cuts_off_who_sends_it() -> None:
         assert (await other.unlock())["ok"]
 
 
+async def test_a_flood_of_stops_is_obeyed_and_then_cut_off() -> None:
+    async with page_at() as page, live_page(page) as live:
+        with pytest.raises((ConnectionError, aiohttp.ClientError)):
+            for number in range(100):
+                await live.socket.send_json({"stop": number})
+            while True:
+                await live.hear()
+        assert 20 <= len(page.daemon.asked) <= 30
+        assert {line for line, _ in page.daemon.asked} == {"stop"}
+
+
 async def test_slow_requests_are_ended_and_others_served_meanwhile(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(listening, "PATIENCE_S", 0.5)
     async with page_at() as page:

@@ -130,7 +130,9 @@ def test_every_state_has_a_colour_in_the_timeline() -> None:
         (replace(SEEN, state="IDLE", arming="disarmed", disarmed_by="a person"), ["disarmed by a person"]),
         (replace(SEEN, arming="disarmed", disarmed_by="a person"), ["DISARMED by a person"]),
         (replace(SEEN, encoder_problem="frozen"), ["frozen"]),
+        (replace(SEEN, is_link_up=False, link_problem="refused"), ["refused"]),
+        (replace(SEEN, is_link_up=False, link_problem="refused", az_deg=None, tick_count=3), []),
     ],
 )
-def test_alarms_are_whole_sentences(seen: Snapshot, said: list[str]) -> None:
+def test_alarms_are_whole_sentences_and_none_before_the_first_poll(seen: Snapshot, said: list[str]) -> None:
     assert alarms_shown(seen) == said

@@ -32,6 +32,7 @@ LATENESS_EDGES_MS = (0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 SNAPSHOT_KEYS = tuple(one.name for one in fields(Snapshot))
 DIGITS = 5
 MOST_SHARED = 20
+FIRST_TICKS = 30
 
 
 class Topic(StrEnum):
@@ -179,7 +180,9 @@ class Feed:
 
 
 def alarms_shown(seen: Snapshot) -> list[str]:
-    """The alarms; who has disarmed it is no sentence by itself."""
+    """The alarms; who has disarmed it is no sentence by itself, and at the start nothing is known for a moment."""
+    if seen.az_deg is None and seen.tick_count < FIRST_TICKS:
+        return []
     return [f"disarmed by {text}" if text == seen.disarmed_by else text for text in alarms(seen)]
 
 

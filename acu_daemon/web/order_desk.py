@@ -33,7 +33,8 @@ class Person:
     name: str = ""
     unlocked_until_s: float = -math.inf
     orders: Allowance = field(default_factory=lambda: Allowance.of(5.0, 20.0))
-    is_barred: bool = False  # too many orders with a wrong seal
+    stops: Allowance = field(default_factory=lambda: Allowance.of(5.0, 20.0))
+    is_barred: bool = False  # too many orders with a wrong seal, or more stops than a hand can press
 
     @property
     def who(self) -> str:
@@ -62,7 +63,8 @@ class OrderDesk:
         self._told = Allowance.of(1.0, 10.0)
 
     def stop(self, person: Person) -> str:
-        """Stop the antenna, whoever asks."""
+        """Stop the antenna, whoever asks; every one is obeyed, and after more than a hand can press the line is cut."""
+        person.is_barred |= not person.stops.take(self._now_s())
         return self._answer(STOP_LINE, person.who)
 
     def take(self, person: Person, order: Any, seal: Any) -> dict[str, Any]:
