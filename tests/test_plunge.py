@@ -71,6 +71,34 @@ def test_the_way_over_the_top_is_never_farther_off_than_the_pass_is_from_the_zen
         assert sky_angle_deg(point.az_deg, point.el_deg, az_deg, el_deg) < 0.05
 
 
+def test_a_fit_that_moves_the_path_makes_no_jump_of_a_way_in_hand() -> None:
+    """0.1 s and 0.03 deg: before the departure, and in the middle of the way; it returns onto the moved path."""
+    target = plunging(500, 89.7)
+    first = buffer_of(target)
+    assert first.crossing is not None
+    moved = Correction(delta_mean_anomaly_rad=-1e-4, delta_raan_rad=5e-5)
+    source, site = target.elements.propagator.corrected(moved), target.station.site
+    for now_tai_s in (first.crossing.departure_tai_s - 1.0, (TOP_TAI_S + first.crossing.departure_tai_s) / 2.0):
+        was = first.at(now_tai_s)
+        assert was is not None
+        rules = keyhole_rules(target.station)
+        begin = (source, site, now_tai_s - 1.0, now_tai_s, "TLE", was.az_deg)
+        then = predict(*begin, keyhole=rules, lead_in_s=13.0, in_hand=first.crossing)  # type: ignore[arg-type]
+        assert then.crossing is not None
+        assert (then.crossing.departure_tai_s, then.crossing.is_plunge) == (first.crossing.departure_tai_s, True)
+        for after_s in (0.0, 0.5):
+            old, new = (one.at(now_tai_s + after_s, follow=True) for one in (first, then))
+            assert old is not None
+            assert new is not None
+            assert sky_angle_deg(old.az_deg, old.el_deg, new.az_deg, new.el_deg) < 0.12
+            assert abs(old.az_deg - new.az_deg) < 2.0
+        end = then.crossing.return_tai_s + 5.0
+        path = encoder_look(source, np.array([end]), site, None)
+        point = then.at(end, follow=True)
+        assert point is not None
+        assert sky_angle_deg(point.az_deg, point.el_deg, float(path.az_deg[0]), float(path.el_deg[0])) < 1e-3
+
+
 def test_what_the_drive_can_follow_and_what_cannot_be_plunged_goes_round() -> None:
     assert buffer_of(plunging(800, 87.0)).crossing is None
     for one in (plunging(500, 89.8, tracking={"zenith_takeover": "never"}), overhead_target(500, 89.8)):
