@@ -16,7 +16,7 @@ from typing import Any
 import aiohttp
 import pass_rig
 
-BY_HAND = 50.0  # scrapes a second
+SCRAPES_PER_S = 50.0
 
 
 def buckets(page: str) -> dict[float, float]:
@@ -57,7 +57,7 @@ async def measure(url: str, turns: int, seconds: float) -> list[tuple[float, flo
             await asyncio.sleep(1.0)
             return p99_ms(before, buckets(await page()))
 
-        return [(await turn(0.0), await turn(BY_HAND)) for _ in range(turns)]
+        return [(await turn(0.0), await turn(SCRAPES_PER_S)) for _ in range(turns)]
 
 
 def main(turns: int = 6, seconds: float = 15.0) -> None:
@@ -76,7 +76,7 @@ def main(turns: int = 6, seconds: float = 15.0) -> None:
                 opened = rig.events("metrics.open")
             pairs = asyncio.run(measure(opened[0]["url"], turns, seconds))
     for without, with_them in pairs:
-        print(f"p99 {without:7.3f} ms without, {with_them:7.3f} ms with {BY_HAND:g} scrapes a second")
+        print(f"p99 {without:7.3f} ms without, {with_them:7.3f} ms with {SCRAPES_PER_S:g} scrapes a second")
     ratios = [with_them / without for without, with_them in pairs]
     print(f"ratio: median {statistics.median(ratios):.2f}, {min(ratios):.2f} to {max(ratios):.2f}")
 
