@@ -23,6 +23,7 @@ mirrored.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import sin
 
 import numpy as np
@@ -104,11 +105,25 @@ class Refraction:
         """tau and its derivative by the apparent elevation, which is LOWEST_TRACED_DEG to 90 deg."""
         sine, cosine = np.sin(el_deg * DEG), np.cos(el_deg * DEG)
         x = _abscissa(sine)
-        value, by_x = np.zeros_like(x), np.zeros_like(x)
-        for coefficient in self.coefficients:
-            by_x = by_x * x + value
-            value = value * x + coefficient
+        value, by_x = _with_slope(self.coefficients) @ _powers(x)
         return value * cosine, (by_x * _abscissa_slope(sine) * cosine * cosine - value * sine) * DEG
+
+
+@lru_cache(maxsize=64)
+def _with_slope(coefficients: tuple[float, ...]) -> Array:
+    """Coefficients of a polynomial and of its derivative, lowest power first, (2, N)."""
+    rising = np.array(coefficients[::-1])
+    return np.stack((rising, np.append(rising[1:] * np.arange(1, rising.size), 0.0)))
+
+
+def _powers(x: Array) -> Array:
+    """Powers 0 to _DEGREE of x, (_DEGREE + 1, N), by doubling: small arrays cost by the number of operations."""
+    powers = np.ones((_DEGREE + 1, *x.shape))
+    known, top = 1, x
+    while known <= _DEGREE:
+        powers[known : 2 * known] = powers[: min(known, _DEGREE + 1 - known)] * top
+        known, top = 2 * known, top * top
+    return powers
 
 
 def traced(surface_n: float, station: Station, scale_height_m: float = SCALE_HEIGHT_M) -> Refraction:
@@ -124,8 +139,9 @@ def traced(surface_n: float, station: Station, scale_height_m: float = SCALE_HEI
     el_deg = np.arcsin(np.clip(sines, -1.0, 1.0)) / DEG
     values = integrated_bending_deg(el_deg, surface_n, radius_m, scale_height_m) / np.cos(el_deg * DEG)
     series = np.polynomial.chebyshev.chebfit(knots, values, _DEGREE)
-    coefficients = tuple(np.polynomial.chebyshev.cheb2poly(series)[::-1].tolist())
-    return Refraction(surface_n, radius_m, coefficients)
+    rising = np.polynomial.chebyshev.cheb2poly(series)
+    rising = np.pad(rising, (0, _DEGREE + 1 - rising.size))  # without air all but one are left out
+    return Refraction(surface_n, radius_m, tuple(rising[::-1].tolist()))
 
 
 def curvature_radius_m(station: Station) -> float:
