@@ -28,10 +28,10 @@ from acu_daemon.assist.mount_model import encoder_look
 from acu_daemon.assist.reading_gate import (
     ABOVE_MAX_ELEVATION,
     ACCELERATION,
+    CORRELATED,
     DWELL,
     OFF_PATH,
     SIDE_LOBE,
-    TOO_FAST,
     WRONG_TARGET,
     Dwell,
     locked_readings,
@@ -88,7 +88,7 @@ def jumps(t: Array) -> tuple[Array, Array]:
 
 
 KINDS = {
-    "faster than the axis": Kind(TOO_FAST, jumps),
+    "faster than the axis": Kind(OFF_PATH, jumps),
     "encoder jump of 40 deg": Kind(OFF_PATH, steady(40.0, 0.0)),
     "side lobe along, no AGC": Kind(SIDE_LOBE, steady(0.3, 1.4)),
     "side lobe across, no AGC": Kind(SIDE_LOBE, steady(-1.9, 0.4)),
@@ -98,11 +98,11 @@ KINDS = {
     "another satellite": Kind(WRONG_TARGET, drift(-0.25, 0.1, 4.0)),
     "above the highest elevation": Kind(ABOVE_MAX_ELEVATION, steady(0.15, 0.1)),
     "azimuth lags near its limit": Kind(ACCELERATION, steady(0.15, 0.0)),
-    "hunting 0.17 deg, 0.95 Hz": Kind(ACCELERATION, hunting(0.17, 6.0)),
-    "hunting 0.15 deg, 0.95 Hz": Kind(ACCELERATION, hunting(0.15, 6.0)),
-    "hunting 0.10 deg, 0.95 Hz": Kind(ACCELERATION, hunting(0.10, 6.0)),
-    "hunting 0.15 deg, 0.3 Hz": Kind(ACCELERATION, hunting(0.15, 1.9)),
-    "hunting 0.15 deg, 2 Hz": Kind(ACCELERATION, hunting(0.15, 12.6)),
+    "hunting 0.17 deg, 0.95 Hz": Kind(CORRELATED, hunting(0.17, 6.0)),
+    "hunting 0.15 deg, 0.95 Hz": Kind(CORRELATED, hunting(0.15, 6.0)),
+    "hunting 0.10 deg, 0.95 Hz": Kind(CORRELATED, hunting(0.10, 6.0)),
+    "hunting 0.15 deg, 0.3 Hz": Kind(CORRELATED, hunting(0.15, 1.9)),
+    "hunting 0.15 deg, 2 Hz": Kind(CORRELATED, hunting(0.15, 12.6)),
     "short locks off the satellite": Kind(DWELL, steady(0.15, 0.1), dwell_s=1.0),
 }
 
@@ -123,7 +123,7 @@ class Place:
         sky: SimulatedSky = table
         if has_air:
             height_m, drawn_by = site.station.height_m, sum(name.encode())
-            sky = ApparentSky(table, make_air(standard_air(site.station), DRAWN, height_m, drawn_by))
+            sky = ApparentSky(table, make_air(standard_air(site.station), DRAWN, height_m, drawn_by), is_late=True)
             site = told_air(site)
         return cls(real_elements(name), site, sky, table.start_tai_s, table.end_tai_s)
 

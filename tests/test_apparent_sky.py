@@ -47,7 +47,8 @@ def test_a_truth_file_stays_geometric_and_its_satellite_rises_earlier_in_air(tmp
     assert in_air.direction(START_TAI_S + 20.0) is None  # at -1 deg
     risen = in_air.direction(START_TAI_S + 30.0)  # at -0.5 deg
     assert risen is not None
-    assert risen[1] == pytest.approx(air.apparent_el_deg(-0.5, 1.2e6), abs=1e-6)
+    late_deg = 0.05 * 1.2e6 / 299792458.0  # the signal is of then, as the daemon has it
+    assert risen[1] == pytest.approx(air.apparent_el_deg(-0.5 - late_deg, 1.2e6), abs=1e-6)
     later_vacuum, later = in_vacuum.direction(START_TAI_S + 140.0), in_air.direction(START_TAI_S + 140.0)
     assert later_vacuum == pytest.approx((40.0, 5.0, 1.2e6), abs=1e-6)
     assert later is not None
@@ -157,3 +158,13 @@ def test_without_air_mount_and_light_time_the_sky_is_the_geometric_one() -> None
     assert not isinstance(usual, ApparentSky)
     assert type(usual) is type(sky_of(target))
     assert isinstance(sky_of(demo_target()), ApparentSky)
+
+
+def test_the_signal_is_late_where_there_is_air_and_a_vacuum_is_that_of_truth_files() -> None:
+    """For the simulator as for the daemon, unless the scenario says otherwise of the simulator."""
+    for has_air in (True, False):
+        target = demo_target(atmosphere={"refraction": has_air})
+        assert target.station.site.has_light_time is has_air
+        for chosen, is_late in ((None, has_air), (True, True), (False, False)):
+            sky = made(Scenario(sky=SkyErrors(light_time=chosen)), station_air(target.station))
+            assert (isinstance(sky, ApparentSky) and sky.is_late) is is_late

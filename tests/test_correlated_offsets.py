@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
-from acu_daemon.assist.screening.correlated_offsets import CorrelatedOffsets
+from acu_daemon.assist.screening.correlated_offsets import CorrelatedOffsets, correlated_deg2
 from acu_daemon.assist.screening.offsets import Offsets
 from acu_daemon.assist.screening.orbit_test import OrbitTest
 from acu_daemon.assist.settings import EstimatorSettings
@@ -48,6 +51,16 @@ def left_out(hunt_deg: Array, hz: float) -> list[bool]:
         result.append(correlated.are_correlated(kept, offsets_of))
         kept = kept if one_deg else Readings.joined([kept, seen])
     return result
+
+
+@given(arrays(np.float64, (2, 12), elements=st.floats(-1.0, 1.0)))
+def test_the_measure_is_the_largest_mean_product_whichever_way_the_offsets_lie(off_deg: Array) -> None:
+    """Of both components alike: a turn or a mirror of the sky changes nothing."""
+    right, up = off_deg
+    turned = (right + up) / np.sqrt(2.0), (right - up) / np.sqrt(2.0)
+    by_hand = [np.mean([right[i] * right[i + k] + up[i] * up[i + k] for i in range(12 - k)]) for k in (1, 2, 3, 4)]
+    for one in ((right, up), (up, right), (-right, up), (right, -up), turned):
+        assert correlated_deg2(Offsets(np.arange(12.0), *one, np.ones(12))) == pytest.approx(max(by_hand), abs=1e-9)
 
 
 @pytest.mark.parametrize("hz", [5.0, 10.0])

@@ -100,6 +100,17 @@ def test_readings_through_air_and_mount_fit_the_orbit_that_made_them(sigma_deg: 
     assert fitted(IN_VACUUM, readings, sigma_deg).residual_rms_deg > 3.0 * fit.residual_rms_deg
 
 
+def test_a_signal_that_comes_late_is_no_satellite_that_is_late() -> None:
+    """Readings and predictions have light time and aberration, or neither; else a fit moves the satellite by 2 ms."""
+    site = replace(IN_AIR, has_light_time=True)
+    tai_s = np.arange(a_pass(site).rise_tai_s, a_pass(site).set_tai_s, 2.0)
+    seen = encoder_look(SOURCE, tai_s, site, None)
+    readings = Readings(tai_s, seen.az_deg, seen.el_deg)
+    told, untold = (fitted(one, readings, 0.0).along_s for one in (site, IN_AIR))
+    assert abs(told) < 1e-4
+    assert abs(untold) > 1e-3
+
+
 def test_rise_and_set_are_apparent_and_the_plan_is_of_the_encoders() -> None:
     in_air, in_vacuum = a_pass(Site(STATION, antenna=AntennaModel(refraction=ANTENNA.refraction))), a_pass(IN_VACUUM)
     rises = look_at(SOURCE, np.array([in_air.rise_tai_s]), IN_VACUUM)

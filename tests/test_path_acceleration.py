@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from made_orbits import EPOCH_TAI_S, circular, site
 
-from acu_daemon.assist.screening.path_acceleration import LIMIT_SHARE, is_low_acceleration
+from acu_daemon.assist.screening.path_acceleration import is_low_acceleration
+from acu_daemon.assist.screening_limits import ACCELERATION_SHARE
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import AxisLimits
 from acu_daemon.orbit.look import look_at
@@ -32,7 +33,7 @@ def test_a_path_is_low_acceleration_where_the_second_differences_of_its_angles_a
         name = "az_deg" if axis == "azimuth" else "el_deg"
         ahead, behind = ((getattr(one, name) - getattr(here, name) + 180.0) % 360.0 - 180.0 for one in (after, before))
         acceleration_deg_s2 = (ahead + behind) / STEP_S**2
-        limit_deg_s2 = LIMIT_SHARE * getattr(SLOW, axis).max_acceleration_deg_s2
+        limit_deg_s2 = ACCELERATION_SHARE * getattr(SLOW, axis).max_acceleration_deg_s2
         is_clear = np.abs(np.abs(acceleration_deg_s2) / limit_deg_s2 - 1.0) > NEAR_SHARE
         is_low = is_low_acceleration(source, where, None, tai_s, settings)
         assert np.array_equal(is_low[is_clear], (np.abs(acceleration_deg_s2) <= limit_deg_s2)[is_clear]), axis

@@ -4,20 +4,13 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acu_daemon.assist.reading_gate import ABOVE_MAX_ELEVATION, TOO_FAST, Dwell, ReadingGate, locked_readings
+from acu_daemon.assist.reading_gate import ABOVE_MAX_ELEVATION, Dwell, below_highest, locked_readings
 from acu_daemon.assist.settings import EstimatorSettings
-from acu_daemon.model import AxisLimits, Reading, Readings
-
-AZIMUTH = AxisLimits(-270.0, 270.0, 20.0, 10.0)
-ELEVATION = AxisLimits(0.0, 90.0, 5.0, 5.0)
+from acu_daemon.model import Reading, Readings
 
 
 def _flags(flags: list[bool], step_s: float = 0.1) -> list[Reading]:
     return [Reading(step_s * k, 10.0, 20.0, flag) for k, flag in enumerate(flags)]
-
-
-def _gate() -> ReadingGate:
-    return ReadingGate(EstimatorSettings(0.03, 0.03, 80.0, azimuth=AZIMUTH, elevation=ELEVATION))
 
 
 def _readings(rows: list[tuple[float, float, float]]) -> Readings:
@@ -48,27 +41,7 @@ def test_the_dwell_does_not_depend_on_how_the_stream_is_cut(flags, cut):
 
 
 def test_readings_above_the_highest_elevation_are_left_out_with_their_reason():
-    kept, rejected = _gate().split(_readings([(0.0, 10.0, 79.9), (0.1, 10.0, 80.1), (0.2, 10.0, 79.9)]))
+    rows = [(0.0, 10.0, 79.9), (0.1, 10.0, 80.1), (0.2, 10.0, 79.9)]
+    kept, rejected = below_highest(_readings(rows), EstimatorSettings(0.03, 0.03, 80.0))
     assert kept.tai_s.tolist() == [0.0, 0.2]
     assert [(r.tai_s, r.reason) for r in rejected] == [(0.1, ABOVE_MAX_ELEVATION)]
-
-
-def test_a_reading_that_jumps_faster_than_the_axis_is_left_out_and_the_next_ones_are_kept():
-    rows = [
-        (0.0, 359.0, 30.0),
-        (0.1, 1.0, 30.1),
-        (0.2, 40.0, 30.2),
-        (0.3, 4.0, 30.3),
-        (0.4, 5.0, 33.0),
-        (0.5, 6.0, 30.5),
-    ]
-    kept, rejected = _gate().split(_readings(rows))
-    assert kept.tai_s.tolist() == [0.0, 0.1, 0.3, 0.5]
-    assert [(r.tai_s, r.reason) for r in rejected] == [(0.2, TOO_FAST), (0.4, TOO_FAST)]
-
-
-def test_a_jump_that_stays_is_believed_once_the_axis_could_have_made_it():
-    rows = [(0.0, 10.0, 30.0), *((0.1 * k, 70.0, 30.0) for k in range(1, 60))]
-    kept, rejected = _gate().split(_readings(rows))
-    assert kept.tai_s[1] <= 60.0 / 20.0
-    assert len(kept) + len(rejected) == 60

@@ -14,10 +14,10 @@ from acu_daemon.assist.reading_gate import (
     ABOVE_MAX_ELEVATION,
     ACCELERATION,
     BELIED,
+    CORRELATED,
     OFF_PATH,
     OUTLIER,
     SIDE_LOBE,
-    TOO_FAST,
     WRONG_TARGET,
 )
 from acu_daemon.assist.session.refit import RefitReply, RefitRequest, RefitSetup, Refitter
@@ -121,9 +121,9 @@ BAD_MINUTES = {
     "drawn away slowly": (WRONG_TARGET, lambda r: _stranger(r, 0.04, -0.03)),
     "drawn away": (WRONG_TARGET, lambda r: _stranger(r, -0.2, 0.1)),
     "another satellite": (WRONG_TARGET, lambda r: _stranger(r, -0.25, 0.1, from_deg=4.0)),
-    "jumps": (TOO_FAST, _jumps),
+    "jumps": (OFF_PATH, _jumps),
     "encoder jump": (OFF_PATH, lambda r: _moved(r, 40.0 * _is_bad(r), 0.0)),
-    "hunting": (ACCELERATION, _hunting),
+    "hunting": (CORRELATED, _hunting),
 }
 
 
@@ -137,7 +137,7 @@ def _without_bad_minute(after_s: float, hz: float) -> RefitReply:
 @pytest.mark.parametrize("kind", BAD_MINUTES)
 def test_a_bad_minute_leaves_the_prediction_where_it_was_and_says_why(kind: str) -> None:
     reason, spoil = BAD_MINUTES[kind]
-    hz = 10.0 if reason == ACCELERATION else 2.0
+    hz = 10.0 if reason == CORRELATED else 2.0
     readings = spoil(_good(hz))
     replies = _feed(_setup(), readings)
     ahead_tai_s = readings.tai_s[-1] + np.arange(0.0, 120.0, 5.0)

@@ -5,27 +5,21 @@ What only an orbit can tell is in assist.screening.track_gate.
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import cos, radians, sqrt
 
-import numpy as np
-
+from acu_daemon.assist.screening_limits import MAX_GAP_S
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import Reading, Readings
-from acu_daemon.units import wrap_180
 
 DWELL = "not acquired for the dwell time yet"
 OUT_OF_STEP = "perhaps the reply to an earlier command: the line is out of step"
 ABOVE_MAX_ELEVATION = "above the highest elevation for fits"
-TOO_FAST = "faster than the axis can move"
 OUTLIER = "far from the prediction of the fit"
 ACCELERATION = "the axis accelerates near its limit"
+CORRELATED = "the axis hunts, or is drawn off the path slowly"
 SIDE_LOBE = "side lobe"
 WRONG_TARGET = "wrong target: it moves unlike the satellite"
 OFF_PATH = "off the predicted path"
 BELIED = "belied by newer readings"
-
-_RATE_MARGIN = 1.1  # an encoder's time tag jitters
-_SIGMA_COUNT = 6.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,9 +28,6 @@ class Rejected:
 
     tai_s: float
     reason: str
-
-
-MAX_GAP_S = 6.0  # a longer gap between readings breaks the acquisition: nobody saw what happened
 
 
 def acquired_since_tai_s(since_tai_s: float | None, last_tai_s: float | None, reading: Reading) -> float | None:
@@ -78,40 +69,11 @@ def locked_readings(readings: Iterable[Reading], dwell: Dwell) -> Readings:
     return Readings.of([reading for reading in readings if dwell.is_locked(reading)])
 
 
-class ReadingGate:
-    """Leaves out what no fit should see, before any orbit is involved.  Mutable; one owner.
-
-    A reading that jumped is compared with the last good one, so a jump is believed once the axis could have made it.
-    """
-
-    def __init__(self, settings: EstimatorSettings) -> None:
-        self._max_elevation_deg = settings.max_fit_elevation_deg
-        self._noise_az_deg = _SIGMA_COUNT * sqrt(2.0) * settings.sigma_azimuth_deg
-        self._noise_el_deg = _SIGMA_COUNT * sqrt(2.0) * settings.sigma_elevation_deg
-        self._azimuth, self._elevation = settings.azimuth, settings.elevation
-        self._last: tuple[float, float, float] | None = None
-
-    def split(self, readings: Readings) -> tuple[Readings, list[Rejected]]:
-        """Part readings into those to use and those left out, oldest first."""
-        keep: list[int] = []
-        rejected: list[Rejected] = []
-        rows = zip(readings.tai_s.tolist(), readings.az_deg.tolist(), readings.el_deg.tolist(), strict=True)
-        for k, row in enumerate(rows):
-            if self._is_too_fast(*row):
-                rejected.append(Rejected(row[0], TOO_FAST))
-                continue
-            self._last = row
-            if self._max_elevation_deg < row[2] < 180.0 - self._max_elevation_deg:
-                rejected.append(Rejected(row[0], ABOVE_MAX_ELEVATION))
-            else:
-                keep.append(k)
-        return readings.part(np.array(keep, dtype=np.int64)), rejected
-
-    def _is_too_fast(self, tai_s: float, az_deg: float, el_deg: float) -> bool:
-        if self._last is None or self._azimuth is None or self._elevation is None:
-            return False
-        dt_s = tai_s - self._last[0]
-        cos_el = max(min(abs(cos(radians(el_deg))), abs(cos(radians(self._last[2])))), 1e-3)
-        far_az = self._azimuth.max_rate_deg_s * _RATE_MARGIN * dt_s + self._noise_az_deg / cos_el
-        far_el = self._elevation.max_rate_deg_s * _RATE_MARGIN * dt_s + self._noise_el_deg
-        return abs(wrap_180(az_deg - self._last[1])) > far_az or abs(el_deg - self._last[2]) > far_el
+def below_highest(readings: Readings, settings: EstimatorSettings) -> tuple[Readings, list[Rejected]]:
+    """Part readings into those below the highest elevation for fits and those left out, oldest first."""
+    most_deg = settings.max_fit_elevation_deg
+    is_high = (readings.el_deg > most_deg) & (readings.el_deg < 180.0 - most_deg)
+    if not is_high.any():
+        return readings, []
+    rejected = [Rejected(tai_s, ABOVE_MAX_ELEVATION) for tai_s in readings.tai_s[is_high].tolist()]
+    return readings.part(~is_high), rejected

@@ -74,7 +74,7 @@ class EstimatorSettings:
     """What an estimator must know beside orbit and site.
 
     Noise is 1 sigma, across the elevation (azimuth x cos(el)) and in elevation; `full` adds the cot term x cot(el) to
-    the elevation's.  Without axis limits no reading counts as too fast.  inversion_count: consecutive inversions that
+    the elevation's.  Without axis limits no path counts as too hard.  inversion_count: consecutive inversions that
     `circular` averages, 3 to 8 (Aguirre and Medeiros 1988, 2.6c).
 
     For `full`: the biases' sigmas (model.AngleBias), those of NPAE, AN, AW and TF, the orbit's (None: from the kind of

@@ -241,7 +241,8 @@ class StationFile(Section):
         s = self.station
         station = Station(s.name, s.latitude_deg, s.longitude_deg, s.height_m)
         antenna = antenna_of(self.atmosphere, self.mount, station)
-        return Site(station, self.time.orientation, antenna=antenna, skyline=self.envelope.skyline)
+        has_light_time = self.atmosphere.refraction  # a vacuum is that of truth files, which are geometric
+        return Site(station, self.time.orientation, has_light_time, antenna, self.envelope.skyline)
 
     @property
     def bounds(self) -> Envelope:

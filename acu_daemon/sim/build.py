@@ -42,7 +42,8 @@ def make_sky(
         turned = propagator.corrected(Correction(delta_raan_rad=radians(errors.delta_raan_deg)))
         of_now = replace(site, has_light_time=False)
         geometric = OrbitSky(DelayedPropagator(turned, errors.along_track_s), of_now, lowest_el_deg)
-    return geometric if air is None and not errors.light_time else ApparentSky(geometric, air, errors.light_time)
+    is_late = air is not None if errors.light_time is None else errors.light_time
+    return ApparentSky(geometric, air, is_late) if is_late or air is not None else geometric
 
 
 def build_fake_acu(

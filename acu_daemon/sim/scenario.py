@@ -1,7 +1,7 @@
 """SIMULATION: what a rehearsal is made of, read from a scenario TOML.
 
 [sky]        along_track_s, delta_raan_deg      the satellite's orbit against the elements: late (+), node east (+)
-             light_time                         whether the signal arrives range / c late
+             light_time                         whether the signal arrives range / c late; left out: where there is air
 [air]        pressure_hpa, temperature_c, humidity_percent, refractivity_factor, refractivity_drawn_within, profile
 [mount]      ia_deg, ie_deg, ca_deg, npae_deg, an_deg, aw_deg, tf_deg (docs/antenna-model.md)
 [drift]      azimuth_deg, elevation_deg, peak_utc_h     of the encoders, from day to night
@@ -36,7 +36,7 @@ class SkyErrors:
 
     along_track_s: float = 0.0
     delta_raan_deg: float = 0.0
-    light_time: bool = False
+    light_time: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)

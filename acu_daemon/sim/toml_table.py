@@ -39,7 +39,7 @@ def _value(key: str, value: object, hint: Any) -> object:
         if value not in get_args(hint):
             raise ValueError(f"expected one of {', '.join(map(repr, get_args(hint)))}")
         return value
-    if hint is bool:
+    if hint in (bool, bool | None):
         if not isinstance(value, bool):
             raise ValueError("expected true or false")
         return value

@@ -7,6 +7,7 @@ import numpy as np
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.config.antenna_tables import AtmosphereSection
 from acu_daemon.model import Site
+from acu_daemon.orbit.look import LIGHT_M_S
 from acu_daemon.pointing.air import standard_air
 from acu_daemon.pointing.antenna_model import AntennaModel
 from acu_daemon.sim.apparent_sky import make_air
@@ -19,7 +20,7 @@ _TOLD = AtmosphereSection()  # the standard air
 
 def told_air(site: Site) -> Site:
     """The site with the air that the daemon reckons with: the standard air of its place."""
-    return replace(site, antenna=AntennaModel(refraction=_TOLD.traced(site.station)))
+    return replace(site, has_light_time=True, antenna=AntennaModel(refraction=_TOLD.traced(site.station)))
 
 
 def with_scale(settings: EstimatorSettings, site: Site) -> EstimatorSettings:
@@ -30,8 +31,12 @@ def with_scale(settings: EstimatorSettings, site: Site) -> EstimatorSettings:
 
 
 def seen_in_air(sky: Sky, seed: int, chosen: AirChoice = DRAWN) -> Sky:
-    """A geometric sky as it appears, its site told of the standard air."""
+    """A geometric sky as it appears, late by the way of the signal; its site told of the standard air."""
     station = sky.site.station
     air = make_air(standard_air(station), chosen, station.height_m, seed)
-    seen = zip(sky.el_deg.tolist(), sky.range_m.tolist(), strict=True)
-    return replace(sky, site=told_air(sky.site), el_deg=np.array([air.apparent_el_deg(*one) for one in seen]))
+    late_s = sky.range_m / LIGHT_M_S
+    az_deg = sky.az_deg - late_s * np.gradient(np.unwrap(sky.az_deg, period=360.0), sky.tai_s)
+    el_deg = sky.el_deg - late_s * np.gradient(sky.el_deg, sky.tai_s)
+    seen = zip(el_deg.tolist(), sky.range_m.tolist(), strict=True)
+    shown_deg = np.array([air.apparent_el_deg(*one) for one in seen])
+    return replace(sky, site=told_air(sky.site), az_deg=az_deg % 360.0, el_deg=shown_deg)

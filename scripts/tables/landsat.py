@@ -58,7 +58,8 @@ def in_air(one: LandsatPass, seed: int) -> LandsatPass:
     station = one.site.station
     air = make_air(standard_air(station), DRAWN, station.height_m, seed)
     there = replace(one, site=told_air(one.site), air=air)
-    return replace(there, el_deg=there.apparent_el_deg(look_at(one.orbit, one.tai_s, one.site)))
+    seen = look_at(one.orbit, one.tai_s, there.site)
+    return replace(there, az_deg=seen.az_deg, el_deg=there.apparent_el_deg(seen))
 
 
 def landsat_passes(

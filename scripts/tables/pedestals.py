@@ -80,7 +80,8 @@ def passes_of(
     rng = np.random.default_rng([22, seed])
     drawn = Station("", float(rng.choice(LATITUDES_DEG)), float(rng.uniform(-180.0, 180.0)), 100.0)
     station = station or drawn
-    site = Site(station, antenna=AntennaModel(refraction=IN_AIR.traced(station)) if has_air else None)
+    antenna = AntennaModel(refraction=IN_AIR.traced(station)) if has_air else None
+    site = Site(station, has_light_time=has_air, antenna=antenna)
     zeros, rest = ZERO_POINTS_DEG * rng.standard_normal(2), square_to_deg * rng.standard_normal(5)
     axes = MountAxes(*zeros.tolist(), *rest.tolist())
     denser = 1.0 + WEATHER_SHARE * float(rng.uniform(-1.0, 1.0))

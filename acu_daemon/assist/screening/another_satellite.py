@@ -13,19 +13,25 @@ import numpy as np
 from acu_daemon.assist.estimators.full.estimated_states import ORBIT, ORBIT_COUNT, states_of
 from acu_daemon.assist.screening.offsets import angles_deg
 from acu_daemon.assist.screening.orbit_test import fitted
+from acu_daemon.assist.screening_limits import (
+    BEFORE_S,
+    ENOUGH,
+    LEAST_COUNT,
+    MANOEUVRE_M_S,
+    MOST_ALONG_S,
+    MOST_MANOEUVRES,
+    NEAR_SHARE,
+    ORBITAL_M_S,
+    SEARCH_S,
+    STEP_S,
+)
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings
 from acu_daemon.errors import OrbitError
 from acu_daemon.model import Correction, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import DEG, EARTH_RATE_RAD_S, Array
 
-MANOEUVRE_M_S = 10.0
-ORBITAL_M_S = 7500.0  # of a low orbit
 NOT_CORRECTED = Correction()
-SEARCH_S, STEP_S = 600.0, 10.0  # early and late
-ENOUGH = 120  # readings
-MOST_ALONG_S, MOST_MANOEUVRES, LEAST_NEAR_SHARE = 400.0, 1.5, 0.9  # decision 0049
-LEAST_COUNT, LEAST_S = 10, 30.0  # fewer, or shorter, tell little of the orbit's plane and rate
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +80,7 @@ def needed(source: Propagator, site: Site, settings: EstimatorSettings, readings
 
     Raises: OrbitError: the source has no answer for one of the times.
     """
-    if len(readings) < LEAST_COUNT or float(np.ptp(readings.tai_s)) < LEAST_S:
+    if len(readings) < LEAST_COUNT or float(np.ptp(readings.tai_s)) < BEFORE_S:
         return None
     few = readings.part(np.unique(np.linspace(0, len(readings) - 1, ENOUGH).astype(int)))
     rate_rad_s = _rate_rad_s(source, float(few.tai_s[0]))
@@ -104,7 +110,7 @@ def why_not_this_satellite(source: Propagator, site: Site, settings: EstimatorSe
     takes = needed(source, site, settings, locked)
     if takes is None:
         return ""
-    if takes.near_share < LEAST_NEAR_SHARE or not np.isfinite(takes.manoeuvres):
+    if takes.near_share < NEAR_SHARE or not np.isfinite(takes.manoeuvres):
         return "no orbit near the elements goes through the locked readings"
     if abs(takes.along_s) <= MOST_ALONG_S and takes.manoeuvres <= MOST_MANOEUVRES:
         return ""

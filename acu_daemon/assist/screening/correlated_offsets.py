@@ -5,23 +5,24 @@ the offsets at lags of a few readings, against that of the readings believed.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
-from acu_daemon.assist.reading_gate import ACCELERATION, OFF_PATH
 from acu_daemon.assist.screening.offsets import Flags, Offsets
 from acu_daemon.assist.screening.orbit_test import OrbitTest
+from acu_daemon.assist.screening_limits import (
+    CORRELATED_RATIO,
+    JUDGED_S,
+    REACH,
+    RESET_S,
+    WINDOW_COUNT,
+    WINDOW_S,
+    YOUNG_S,
+)
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import Readings
 
-WINDOW_S, WINDOW_COUNT = 3.0, 8  # both at least
-BEFORE_S = 120.0
 LAGS = (1, 2, 3, 4)  # slow readings of a fast axis change their sign from one to the next
-FACTOR = 2.0  # of the noise squared, and of what the readings believed show
-REACH = 2.0  # times as far off as is near an axis may hunt
-TURNING_S, TURNING_SHARE = 20.0, 0.3  # so much of them is left without their trend: an axis that hunts
-LONGEST_S = 75.0  # then such readings are better than none
 _NONE = Readings.of([])
 
 
@@ -34,85 +35,65 @@ def correlated_deg2(seen: Offsets) -> float:
 class CorrelatedOffsets:
     """Takes readings off the path by little, oldest first.  Mutable; one owner.
 
-    reason: of the newest readings, "" while they are not correlated.  begin_tai_s: since when the newest ones are.
+    begin_tai_s: since when the newest ones are correlated; infinite while they are not.
     """
 
     def __init__(self, orbit_test: OrbitTest, settings: EstimatorSettings) -> None:
-        self._orbit_test, self._settings = orbit_test, settings
+        self._orbit_test = orbit_test
+        self._noise_deg2 = settings.sigma_azimuth_deg**2 + settings.sigma_elevation_deg**2
         self._recent = _NONE
-        self._since_tai_s: float | None = None
-        self.reason = ""
         self.begin_tai_s = np.inf
 
     def is_within(self, seen: Offsets) -> Flags:
         """Which readings to ask about: the near ones; while others are correlated, those farther off too."""
-        within: Flags = seen.angle_deg <= (REACH if self.reason else 1.0) * seen.near_deg
+        within: Flags = seen.angle_deg <= (REACH if np.isfinite(self.begin_tai_s) else 1.0) * seen.near_deg
         return within
 
     def take(self, readings: Readings) -> None:
         """Take the next readings that `are_correlated` asks about."""
         recent = Readings.joined([self._recent, readings])
-        count = max(WINDOW_COUNT, int(np.count_nonzero(recent.tai_s > recent.tai_s[-1] - TURNING_S)), len(readings))
+        count = max(WINDOW_COUNT, int(np.count_nonzero(recent.tai_s > recent.tai_s[-1] - YOUNG_S)), len(readings))
         self._recent = recent.part(slice(-count, None))
 
     def are_correlated(self, kept: Readings, offsets_of: Callable[[Readings], Offsets]) -> bool:
-        """Say whether the newest offsets are correlated.  offsets_of: from the fit to the kept ones.
+        """Say whether the newest offsets are correlated; after RESET_S such readings are better than none.
 
-        Where they are about the path as it was extrapolated, the orbit through them and those kept decides.
+        offsets_of: from the fit to the kept ones.  Where offsets are about the path as it was extrapolated, the orbit
+        through them and those kept decides.
         """
         tai_s = self._recent.tai_s
         newest_count = max(WINDOW_COUNT, int(np.count_nonzero(tai_s > tai_s[-1] - WINDOW_S)))
         newest = offsets_of(self._recent.part(slice(-newest_count, None)))
-        self.reason = self._reason(kept, newest, offsets_of)
-        if not self.reason:
-            self._since_tai_s = None
+        if not self._is_no_orbits(kept, newest):
+            self.begin_tai_s = np.inf
             return False
-        if self._since_tai_s is None:
-            self._since_tai_s = self.begin_tai_s = self._begin_tai_s(newest)
-        return float(tai_s[-1]) < self._since_tai_s + LONGEST_S
+        if np.isinf(self.begin_tai_s):
+            self.begin_tai_s = self._likely_begin_tai_s(newest) - WINDOW_S  # two bad readings cost more than three good
+        return float(tai_s[-1]) < self.begin_tai_s + RESET_S
 
-    def _noise_deg2(self) -> float:
-        return self._settings.sigma_azimuth_deg**2 + self._settings.sigma_elevation_deg**2
-
-    def _reason(self, kept: Readings, newest: Offsets, offsets_of: Callable[[Readings], Offsets]) -> str:
-        if newest.tai_s.size < WINDOW_COUNT or correlated_deg2(newest) <= FACTOR * self._noise_deg2():
-            return ""
-        count = int(np.count_nonzero(self._recent.tai_s >= self.begin_tai_s)) if self.reason else 0
-        window = self._recent.part(slice(-max(count, newest.tai_s.size), None))
-        before = kept.part((kept.tai_s < window.tai_s[0]) & (kept.tai_s > window.tai_s[0] - BEFORE_S))
+    def _is_no_orbits(self, kept: Readings, newest: Offsets) -> bool:
+        if newest.tai_s.size < WINDOW_COUNT or correlated_deg2(newest) <= CORRELATED_RATIO * self._noise_deg2:
+            return False
+        count = max(newest.tai_s.size, int(np.count_nonzero(self._recent.tai_s >= self.begin_tai_s)))
+        window = self._recent.part(slice(-count, None))
+        before = kept.part((kept.tai_s < window.tai_s[0]) & (kept.tai_s > window.tai_s[0] - JUDGED_S))
         if len(before) < WINDOW_COUNT:
-            return ""
+            return False
         together = self._orbit_test.best_offsets(Readings.joined([before, window]), 1.0)
         if together is None:
-            return ""
+            return False
         old, new = together.part(slice(None, len(before))), together.part(slice(len(before), None))
-        if correlated_deg2(new) <= FACTOR * max(self._noise_deg2(), _noise_seen_deg2(old), correlated_deg2(old)):
-            return ""
-        whole = offsets_of(window)
-        return ACCELERATION if correlated_deg2(_turning(whole)) > TURNING_SHARE * correlated_deg2(whole) else OFF_PATH
+        return correlated_deg2(new) > CORRELATED_RATIO * max(
+            self._noise_deg2, _noise_seen_deg2(old), correlated_deg2(old)
+        )
 
-    def _begin_tai_s(self, seen: Offsets) -> float:
-        """Where the readings become more than noise: the most likely instant; where they drift, when that began."""
-        noise_deg2 = self._noise_deg2()
-        square = seen.angle_deg**2 / noise_deg2
+    def _likely_begin_tai_s(self, seen: Offsets) -> float:
+        """The instant from which on, most likely, the offsets are more than the configured noise."""
+        square = seen.angle_deg**2 / self._noise_deg2
         count = np.arange(square.size, 0, -1)
         later = np.cumsum(square[::-1])[::-1] / count
         cost = np.cumsum(square) - square + count * (1.0 + np.log(np.maximum(later, 1.0)))
-        correlated = seen.part(slice(int(np.argmin(cost)), None))
-        first_tai_s = float(correlated.tai_s[0])
-        right, up = correlated.drift_deg_s(WINDOW_S)
-        if self.reason != OFF_PATH or right == up == 0.0:
-            return first_tai_s
-        off = float(np.mean(correlated.right_deg) * right + np.mean(correlated.up_deg) * up)
-        on_path_tai_s = float(np.mean(correlated.tai_s)) - off / (right * right + up * up)
-        return min(max(on_path_tai_s, first_tai_s - WINDOW_S), first_tai_s)
-
-
-def _turning(seen: Offsets) -> Offsets:
-    """What is left of offsets without their mean and drift: much where an axis hunts."""
-    t = seen.tai_s - seen.tai_s[0]
-    right_deg, up_deg = (one - np.polyval(np.polyfit(t, one, 1), t) for one in (seen.right_deg, seen.up_deg))
-    return replace(seen, right_deg=right_deg, up_deg=up_deg)
+        return float(seen.tai_s[int(np.argmin(cost))])
 
 
 def _noise_seen_deg2(seen: Offsets) -> float:

@@ -6,13 +6,15 @@ import numpy as np
 
 from acu_daemon.assist.reading_gate import OFF_PATH, SIDE_LOBE, WRONG_TARGET
 from acu_daemon.assist.screening.offsets import Flags, Offsets
+from acu_daemon.assist.screening_limits import (
+    BEFORE_S,
+    DRIFT_BEAMS_S,
+    DRIFT_SCATTERS,
+    LOW_DB,
+    RECENT_S,
+    SIDE_LOBE_BEAMS,
+)
 from acu_daemon.model import Readings
-
-SIDE_LOBE_BEAMS = (1.05, 2.2)  # around the 1.2 to 2 of a side lobe: noise and the path's own error
-LOW_DB = 3.0  # under the level kept before: a side lobe's
-LEVEL_S = 30.0
-NEWEST_S = 10.0
-DRIFT_BEAMS_S = 0.03  # a side lobe keeps its offset
 
 
 def is_beside(seen: Offsets, beamwidth_deg: float) -> Flags:
@@ -20,15 +22,6 @@ def is_beside(seen: Offsets, beamwidth_deg: float) -> Flags:
     beams = seen.angle_deg / beamwidth_deg
     beside: Flags = (beams >= SIDE_LOBE_BEAMS[0]) & (beams <= SIDE_LOBE_BEAMS[1])
     return beside
-
-
-def is_weak_beside(seen: Offsets, readings: Readings, kept: Readings, beamwidth_deg: float) -> Flags:
-    """Whether readings are a side lobe's by offset and level; none is where nobody knows the level."""
-    before_db = level_db(kept, LEVEL_S)
-    if readings.agc_db is None or before_db is None:
-        return np.zeros(len(readings), dtype=np.bool_)
-    weak: Flags = is_beside(seen, beamwidth_deg) & (readings.agc_db < before_db - LOW_DB)
-    return weak
 
 
 def level_db(readings: Readings, newest_s: float) -> float | None:
@@ -42,25 +35,28 @@ def level_db(readings: Readings, newest_s: float) -> float | None:
 
 def rise_db(kept: Readings, off: Readings) -> float | None:
     """How much stronger the newest readings off the path are than those kept; None where nobody knows."""
-    before_db, now_db = level_db(kept, LEVEL_S), level_db(off, NEWEST_S)
+    before_db, now_db = level_db(kept, BEFORE_S), level_db(off, RECENT_S)
     return None if before_db is None or now_db is None else now_db - before_db
 
 
 def reason_of(seen: Offsets, rise: float | None, beamwidth_deg: float) -> str:
     """The reason of readings off the path, oldest first, by the newest of them."""
-    if hypot(*seen.drift_deg_s(NEWEST_S)) > DRIFT_BEAMS_S * beamwidth_deg and seen.tai_s.size > 2:
+    newest = seen.tai_s >= seen.tai_s[-1] - RECENT_S
+    drift_deg_s = hypot(*seen.drift_deg_s(RECENT_S))
+    scatter_deg = hypot(float(np.std(seen.right_deg[newest])), float(np.std(seen.up_deg[newest])))
+    is_drift = drift_deg_s * float(np.ptp(seen.tai_s[newest])) > DRIFT_SCATTERS * scatter_deg
+    if is_drift and drift_deg_s > DRIFT_BEAMS_S * beamwidth_deg and seen.tai_s.size > 2:
         return WRONG_TARGET
-    newest = seen.tai_s >= seen.tai_s[-1] - NEWEST_S
     is_steady_beside = float(np.mean(is_beside(seen, beamwidth_deg)[newest])) > 0.5
     return SIDE_LOBE if is_steady_beside and (rise is None or rise < -LOW_DB) else OFF_PATH
 
 
-def left_path_tai_s(seen: Offsets, longest_s: float) -> float:
-    """When a track that drifts was on the path: its offset traced back to zero, by longest_s at most."""
-    right, up = seen.drift_deg_s(NEWEST_S)
+def left_path_tai_s(seen: Offsets) -> float:
+    """When a track that drifts was on the path: its offset traced back to zero, by RECENT_S at most."""
+    right, up = seen.drift_deg_s(RECENT_S)
     first_tai_s = float(seen.tai_s[0])
     speed2 = right * right + up * up
     if speed2 == 0.0:
-        return first_tai_s - longest_s
+        return first_tai_s - RECENT_S
     back_s = float(seen.right_deg[0] * right + seen.up_deg[0] * up) / speed2
-    return first_tai_s - min(max(back_s, 0.0), longest_s)
+    return first_tai_s - min(max(back_s, 0.0), RECENT_S)

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from acu_daemon.assist.mount_model import encoder_look, sigma_deg
+from acu_daemon.assist.screening_limits import LEAST_DRIFT_S, NEAR_BEAMS, NEAR_SIGMAS
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import FitResult, Readings, Site
 from acu_daemon.orbit.look import Look, look_along, look_at
@@ -15,10 +16,7 @@ from acu_daemon.units import Array, wrap_180_array
 
 Flags = npt.NDArray[np.bool_]
 
-NEAR_BEAMS = 0.2
-NEAR_SIGMAS = 6.0
 LEAST_COS_EL = 1e-3
-LEAST_SPAN_S = 0.5  # a drift is taken over
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +45,7 @@ class Offsets:
         """How fast the offset of the newest readings changes, right and up; 0 where they are too few to tell."""
         newest = self.tai_s >= self.tai_s[-1] - newest_s
         t = self.tai_s[newest] - self.tai_s[newest].mean()
-        if t.size < 2 or float(np.ptp(t)) < LEAST_SPAN_S:
+        if t.size < 2 or float(np.ptp(t)) < LEAST_DRIFT_S:
             return 0.0, 0.0
         return float(t @ self.right_deg[newest] / (t @ t)), float(t @ self.up_deg[newest] / (t @ t))
 

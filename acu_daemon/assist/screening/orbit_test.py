@@ -11,14 +11,11 @@ import numpy as np
 from acu_daemon.assist.estimators.full.estimated_states import make_prior, states_of
 from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
 from acu_daemon.assist.screening.offsets import Offsets, offsets
+from acu_daemon.assist.screening_limits import BEFORE_S, NARROW, NEAR_SHARE
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings, StateSigmas
 from acu_daemon.errors import OrbitError
 from acu_daemon.model import FitResult, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
-
-NEAR_SHARE = 0.9  # of the readings must lie near the orbit that fits them
-PAST_S = 30.0  # so much of the readings believed before must stay near
-SURE_ALONG = 3.0  # the mean anomaly is never given more room than this
 
 
 def widened(source: Propagator, settings: EstimatorSettings, factor: float) -> EstimatorSettings:
@@ -27,8 +24,7 @@ def widened(source: Propagator, settings: EstimatorSettings, factor: float) -> E
     if isinstance(sigmas, StateSigmas):
         wide: ElementSigmas | StateSigmas = StateSigmas(factor * sigmas.position_m, factor * sigmas.velocity_m_s)
     else:
-        along_deg = min(factor, SURE_ALONG) * sigmas.mean_anomaly_deg
-        wide = replace(ElementSigmas(*(factor * sigma for sigma in astuple(sigmas))), mean_anomaly_deg=along_deg)
+        wide = ElementSigmas(*(factor * sigma for sigma in astuple(sigmas)))
     return replace(settings, orbit_sigmas=wide, azimuth=None, elevation=None)
 
 
@@ -60,15 +56,15 @@ class OrbitTest:
             return None
         return None if found is None else found[1]
 
-    def verdict(self, before: Readings | None, questioned: Readings, factor: float) -> Offsets | None:
+    def verdict(self, before: Readings | None, questioned: Readings) -> Offsets | None:
         """Offsets of the questioned readings from the orbit that fits, or None: no orbit near the elements does."""
-        seen = self.best_offsets(questioned if before is None else Readings.joined([before, questioned]), factor)
+        seen = self.best_offsets(questioned if before is None else Readings.joined([before, questioned]), NARROW)
         if seen is None:
             return None
         old, new = seen.part(slice(None, -len(questioned))), seen.part(slice(-len(questioned), None))
         if float(np.mean(new.is_near)) < NEAR_SHARE:
             return None
-        if before is not None and float(np.mean(old.is_near[old.tai_s >= old.tai_s[-1] - PAST_S])) < NEAR_SHARE:
+        if before is not None and float(np.mean(old.is_near[old.tai_s >= old.tai_s[-1] - BEFORE_S])) < NEAR_SHARE:
             return None
         return new
 

@@ -4,12 +4,12 @@ import numpy as np
 
 from acu_daemon.assist.mount_model import encoder_look
 from acu_daemon.assist.screening.offsets import Flags, propagator_of
+from acu_daemon.assist.screening_limits import ACCELERATION_SHARE
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.model import FitResult, Site
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.units import Array
 
-LIMIT_SHARE = 0.3  # of the drive's acceleration: beyond it autotrack lags
 HALF_STEP_S = 0.25  # of the difference of rates that gives a path's acceleration
 
 
@@ -28,5 +28,5 @@ def is_low_acceleration(
     is_low = np.ones(count, dtype=np.bool_)
     for rate_deg_s, axis in ((path.az_rate_deg_s, settings.azimuth), (path.el_rate_deg_s, settings.elevation)):
         acceleration_deg_s2 = (rate_deg_s[count:] - rate_deg_s[:count]) / (2.0 * HALF_STEP_S)
-        is_low &= np.abs(acceleration_deg_s2) <= LIMIT_SHARE * axis.max_acceleration_deg_s2
+        is_low &= np.abs(acceleration_deg_s2) <= ACCELERATION_SHARE * axis.max_acceleration_deg_s2
     return is_low
