@@ -1,5 +1,6 @@
 """The foreground: every 0.1 s poll the ACU, store the reading, write the command registers.  Never waits for a fit."""
 
+import asyncio
 import math
 from collections.abc import Callable
 from typing import Any
@@ -98,6 +99,7 @@ class Foreground:
         self.lateness = Lateness()
         self.motion = Motion()
         self.stop_times = StopTimes()
+        self._asked = asyncio.Event()  # a person has said a word: a rest ends
 
     async def run(self) -> None:
         """Tick at the tenths of UTC seconds; a late tick is counted and skipped, never sent in a burst."""
@@ -131,12 +133,23 @@ class Foreground:
 
     async def _rest(self, from_tai_s: float, ticks: int) -> float:
         """Sleep over so many ticks, until a person says a word: a STOP shall not wait.  Returns the due one, TAI s."""
-        period_s, due_tai_s = self._config.period_s, from_tai_s
-        for tick_number in range(1, ticks + 1):
-            due_tai_s = round(from_tai_s / period_s + tick_number) * period_s
-            await self._clock.sleep_until(due_tai_s)
-            if self._requests and self._clock.tai_s() - due_tai_s < LATE_SHARE * period_s:
-                break
+        period_s = self._config.period_s
+        due_tai_s = round(from_tai_s / period_s + ticks) * period_s
+        self._asked.clear()
+        sleeping = asyncio.ensure_future(self._clock.sleep_until(due_tai_s))
+        asked = asyncio.ensure_future(self._asked.wait())
+        try:
+            await asyncio.wait((sleeping, asked), return_when=asyncio.FIRST_COMPLETED)
+            if sleeping.done():
+                return due_tai_s
+        finally:
+            for waiting in (sleeping, asked):
+                waiting.cancel()
+            await asyncio.gather(sleeping, asked, return_exceptions=True)
+        next_tai_s = math.ceil(self._clock.tai_s() / period_s + FIRST_SHARE) * period_s
+        if next_tai_s < due_tai_s:
+            due_tai_s = next_tai_s
+        await self._clock.sleep_until(due_tai_s)
         return due_tai_s
 
     def _may_rest(self) -> bool:
@@ -210,6 +223,7 @@ class Foreground:
         elif request in waiting:
             return
         self._requests = (*waiting, request)
+        self._asked.set()
 
     def _silence_s(self) -> float:
         """On another connection, however soon it came, everything is read again before it is commanded."""
