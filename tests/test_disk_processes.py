@@ -166,7 +166,7 @@ class Run:
         self.rig.daemon.send_signal(signal.SIGTERM)
         assert self.rig.daemon.wait(PATIENCE_S) == 0
         self.keep_log()
-        paths = [*self.rig.kept.iterdir(), self.recording]
+        paths = [path for path in (*self.rig.kept.iterdir(), self.recording) if path.is_file()]
         self.files = {path.name: path.read_bytes() for path in paths}
         self.disk.make_read_only()
         self.rig.start_daemon()

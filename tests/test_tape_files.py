@@ -26,6 +26,7 @@ from acu_daemon.cli.virtual_station import run_days
 from acu_daemon.config.to_settings import estimator_settings
 from acu_daemon.control.receiver_signal import SignalSample
 from acu_daemon.control.tick_input import Request, StowBy, StowWish
+from acu_daemon.edge import tape_file
 from acu_daemon.edge.hooks import Hook, HookResult
 from acu_daemon.edge.kept_tapes import KeepRules, remove_old, tape_name
 from acu_daemon.edge.stored_orbit import orbit_json, orbit_of
@@ -148,22 +149,30 @@ def full(_fd: int, _data: bytes) -> int:
     raise OSError(errno.ENOSPC, "No space left on device")
 
 
-def test_on_a_full_disk_the_recording_ends_and_is_an_alarm_and_nothing_else(
+def test_on_a_full_disk_the_recording_waits_for_room_which_is_an_alarm_until_it_is_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    kept = tape(tmp_path / f"a{SUFFIX}")
-    monkeypatch.setattr(os, "write", full)
+    path = tmp_path / f"a{SUFFIX}"
+    kept, given = tape(path), ticks(60)
     with capture_logs() as logs:
-        for record in ticks(30):
+        monkeypatch.setattr(os, "write", full)
+        for record in given[:60]:
             kept.note(record)
-    monkeypatch.undo()
+        assert kept.problem == f"a{SUFFIX}: No space left on device"
+        monkeypatch.undo()
+        for record in given[60:]:
+            kept.note(record)
+        assert kept.problem == ""
     kept.close()
-    assert [one["event"] for one in logs] == ["tape.ended"]
-    assert kept.problem == f"a{SUFFIX}: No space left on device"
-    assert not read_tape(tmp_path / f"a{SUFFIX}").is_whole
+    assert [one["event"] for one in logs] == ["tape.not_saved", "tape.saved_again"]
+    read = read_tape(path)
+    assert (read.is_whole, len(list(read.records()))) == (True, len(given))
 
 
-def test_a_directory_that_cannot_be_made_a_disk_that_hangs_and_too_large_a_file_end_it_too(tmp_path: Path) -> None:
+def test_a_recording_that_no_disk_takes_ends_and_is_an_alarm_and_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tape_file, "MOST_UNSAVED_BYTES", 200)
     (tmp_path / "file").write_text("")
     ended = [
         tape(tmp_path / "file" / f"a{SUFFIX}"),
@@ -171,7 +180,7 @@ def test_a_directory_that_cannot_be_made_a_disk_that_hangs_and_too_large_a_file_
         tape(tmp_path / f"c{SUFFIX}", largest_bytes=10),
     ]
     for kept in ended:
-        for record in ticks(30):
+        for record in ticks(60):
             kept.note(record)
         kept.close()
     assert [kept.problem.partition(": ")[2] for kept in ended] == [

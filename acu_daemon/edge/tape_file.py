@@ -28,6 +28,7 @@ FORMAT = 1
 HAND_OVER_S = 0.4  # so long records wait in the loop at most, a tick more where it comes late
 LEVEL = 4
 LARGEST_BYTES = 200_000_000  # of a file: a month of one pass at 10 Hz
+MOST_UNSAVED_BYTES = 1_000_000  # a quarter of an hour at 10 Hz
 _LARGEST_TEXT = 4_000_000_000
 _CHUNK = 65536
 _GZIP = 31
@@ -36,8 +37,8 @@ _GZIP = 31
 class TapeFile:
     """Keeps the records of one run.  `note` belongs to the loop, all else is done in the writer's thread.
 
-    Where a write fails, or the disk does not keep up, the tape ends there, which is told: one with a gap could not be
-    replayed.  Nothing of that stops a pass.
+    On a full disk it waits in memory until there is room again.  Where that lasts too long, or the disk does not keep
+    up, the tape ends there, which is told: one with a gap could not be replayed.  Nothing of that stops a pass.
     """
 
     def __init__(self, path: Path, head: dict[str, Any], writer: Writer, largest_bytes: int = LARGEST_BYTES) -> None:
@@ -52,8 +53,9 @@ class TapeFile:
         self._packer = zlib.compressobj(LEVEL, zlib.DEFLATED, _GZIP)
         self._fd = -1
         self._size = 0
-        self._is_over = False
-        self.problem = ""  # why nothing is kept any more
+        self._unsaved = b""  # what the disk has not taken yet
+        self._is_over = self._is_closed = False
+        self.problem = ""  # why the newest of it is not on the disk
         self._log: Any = structlog.get_logger("tape")
         self._put(partial(self._begin, json.dumps({"format": FORMAT, **head}, allow_nan=False) + "\n"))
 
@@ -80,33 +82,45 @@ class TapeFile:
             self._end("the disk does not keep up")
 
     def _end(self, why: str) -> None:
-        self._is_over, self.problem = True, f"{self.path.name}: {why}"
+        self._is_over, self.problem, self._unsaved = True, f"{self.path.name}: {why}", b""
         self._log.warning("tape.ended", file=str(self.path), reason=why)
 
     def _begin(self, head: str) -> None:
-        try:
-            self.path.parent.mkdir(mode=0o750, parents=True, exist_ok=True)
-            self._fd, self.path = _new_file(self.path)
-        except OSError as error:
-            self._end(error.strerror or str(error))
-            return
         self._append(self._packer.compress(head.encode()) + self._packer.flush(zlib.Z_SYNC_FLUSH))
 
     def _write(self, batch: list[Record]) -> None:
+        if self._is_over:
+            return
         text = "".join(map(self._lines.line, batch)).encode()
         self._append(self._packer.compress(text) + self._packer.flush(zlib.Z_SYNC_FLUSH))
         if self._size > self._largest_bytes and not self._is_over:
             self._end(f"it has {self._size / 1e6:.0f} MB")
 
     def _append(self, data: bytes) -> None:
-        if self._fd < 0 or self._is_over:
+        """Write; what finds no room is kept, up to a quarter of an hour of it, and tried again with the next."""
+        if self._is_over:
             return
+        self._unsaved += data
         try:
-            while data:
-                written = os.write(self._fd, data)
-                self._size, data = self._size + written, data[written:]
+            if self._fd < 0:
+                self.path.parent.mkdir(mode=0o750, parents=True, exist_ok=True)
+                self._fd, self.path = _new_file(self.path)
+            while self._unsaved:
+                written = os.write(self._fd, self._unsaved)
+                self._size, self._unsaved = self._size + written, self._unsaved[written:]
         except OSError as error:
-            self._end(error.strerror or str(error))
+            self._cannot(error.strerror or str(error))
+            return
+        if self.problem:
+            self._log.info("tape.saved_again", file=str(self.path))
+            self.problem = ""
+
+    def _cannot(self, why: str) -> None:
+        if not self.problem:
+            self._log.warning("tape.not_saved", file=str(self.path), reason=why)
+        self.problem = f"{self.path.name}: {why}"
+        if len(self._unsaved) > MOST_UNSAVED_BYTES:
+            self._end(why)
 
     def close(self) -> None:
         """Keep what waits, and close; done when the writer has come to it."""
@@ -114,14 +128,17 @@ class TapeFile:
         self._writer.put(partial(self._close, batch))
 
     def _close(self, batch: list[Record]) -> None:
-        if self._fd < 0:
+        if self._is_closed:
             return
+        self._is_closed = True
         self._write(batch)
         self._append(self._packer.flush(zlib.Z_FINISH))
-        with contextlib.suppress(OSError):
-            os.fsync(self._fd)
-        os.close(self._fd)
-        self._fd = -1
+        if self._unsaved and not self._is_over:
+            self._end(self.problem.partition(": ")[2])
+        if self._fd >= 0:
+            with contextlib.suppress(OSError):
+                os.fsync(self._fd)
+            os.close(self._fd)
 
 
 def _new_file(path: Path) -> tuple[int, Path]:

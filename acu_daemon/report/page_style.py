@@ -6,7 +6,8 @@ STYLE = """
 @media(prefers-color-scheme:dark){:root{--paper:#14181b;--ink:#e6e9ea;--dim:#98a3aa;--rule:#2d353a;--card:#1b2125;
 --a:#6cb0ea;--b:#ee9a5f;--good:#62c493;--bad:#ff8a80;--watch:#e0b54a;--hold:#4a3b1f;--search:#4d2a22;--auto:#1e3a2b;
 --other:#2a3136}}
-*{box-sizing:border-box}body{margin:0;background:var(--paper);color:var(--ink);font:15px/1.5 system-ui,sans-serif}
+*{box-sizing:border-box}a{color:var(--a)}
+body{margin:0;background:var(--paper);color:var(--ink);font:15px/1.5 system-ui,sans-serif}
 main{max-width:1120px;margin:0 auto;padding:24px 20px 60px}h1{font-size:26px;margin:0 0 2px}
 h2{font-size:17px;margin:34px 0 10px;padding-bottom:4px;border-bottom:1px solid var(--rule)}
 h3{font-size:14px;margin:16px 0 4px;color:var(--dim);font-weight:600}p{margin:6px 0}.dim{color:var(--dim)}
