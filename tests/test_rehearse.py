@@ -94,7 +94,7 @@ def test_a_pass_of_tonight_is_rehearsed_with_one_command_and_the_stations_own_ac
     config = write(tmp_path / "config", scd=replaced(BROUWER, "1989-01-31T09:58:00Z", epoch))
     command = [sys.executable, "-m", "acu_daemon", "rehearse", "--config", str(config), "--satellite", "scd"]
     done = subprocess.run(
-        [*command, "--before", "2", "--duration", "13", "--out", str(tmp_path / "out")],
+        [*command, "--before", "2", "--duration", "13", "--out", str(tmp_path / "out"), "--web", "127.0.0.1:0"],
         env=os.environ | {"XDG_STATE_HOME": str(tmp_path / "state")},
         capture_output=True,
         text=True,
@@ -103,6 +103,7 @@ def test_a_pass_of_tonight_is_rehearsed_with_one_command_and_the_stations_own_ac
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.startswith("REHEARSAL on a SIMULATION: SCD-1")
+    assert '"page.open"' in done.stdout
     assert re.search(r"on the satellite at the end +yes", done.stdout)
     assert '"signal is lost"' in done.stdout or "the signal is lost" in done.stdout
     out = tmp_path / "out" / "scd"
