@@ -217,8 +217,17 @@ def faults(config: Path, book: Sequence[Entry], granted: set[int], from_tai_s: f
 
 
 def is_excused(entry: Entry) -> bool:
-    """Whether wind, a person, or a plan that was made anew took the antenna from a pass."""
-    words = ("wind", "paused by a person", "lost to", "skipped", "useful for", "cannot be there in time")
+    """Whether wind, a person, a kill, or a plan that was made anew took the antenna from a pass."""
+    words = (
+        "wind",
+        "paused by a person",
+        "lost to",
+        "skipped",
+        "useful for",
+        "cannot be there in time",
+        "restart",
+        "mid-pass",
+    )
     return any(word in entry.reason for word in words)
 
 

@@ -9,7 +9,7 @@ from test_schedule import DAY, RULES, track
 from acu_daemon.edge.schedule_file import NAME, ScheduleFile
 from acu_daemon.errors import UsageError
 from acu_daemon.schedule.book import Entry, PassState, merged
-from acu_daemon.schedule.decisions import decide
+from acu_daemon.schedule.decisions import RESUMED, decide
 from acu_daemon.schedule.rules import PassRequest, Wish
 
 UNTIL = DAY + 86400.0
@@ -65,6 +65,14 @@ def test_an_entry_that_a_plan_does_not_have_is_never_lost(state, now_s, becomes)
     after = merged([replace(entry, state=state)], [], DAY + now_s, UNTIL)
     assert [one.state for one in after.book] == [becomes]
     assert bool(after.said) == (state is not becomes)
+
+
+def test_a_pass_that_was_to_be_gone_on_with_after_a_kill_and_was_over_by_then_failed_with_that_reason():
+    [_, entry] = first_book()
+    after = merged([replace(entry, state=PassState.PLANNED, reason=RESUMED)], [], DAY + 3000.0, UNTIL)
+    assert [(one.state, one.reason) for one in after.book] == [
+        (PassState.FAILED, "the daemon ended in mid-pass, and came back too late")
+    ]
 
 
 def test_the_file_gives_back_what_it_was_given_to_another_process(tmp_path):

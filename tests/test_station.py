@@ -127,6 +127,7 @@ def test_a_kill_in_mid_pass_is_gone_on_from_and_nothing_is_lost(tmp_path: Path) 
     with ScheduleFile(state, is_read_only=True) as file:
         [scd] = [one for one in file.book(START) if one.satellite == "scd" and one.rise_tai_s < START + 2400.0]
     assert scd.state in (PassState.DONE, PassState.DEGRADED), scd
+    assert "gone on with after a restart" in scd.reason
 
 
 def test_a_persons_words_hold_at_once_and_a_bad_file_is_refused_while_the_old_one_stays(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.daemon.verdict import alarms
 from acu_daemon.edge.hooks import Hook, HookResult, Hooks
 from acu_daemon.schedule.book import Entry, PassState
+from acu_daemon.schedule.decisions import RESUMED
 
 DEGRADED_SHARE = 0.5  # of the useful seconds with the signal
 NO_SIGNAL = "no signal: the satellite was silent, or not where it should be"
@@ -65,6 +66,8 @@ class PassCourse:
     def begun(self, entry: Entry, phantom: PhantomPass | None) -> None:
         """The run of a pass begins.  phantom: what was found of it before."""
         self._tracked = Tracked(phantom=phantom)
+        if entry.reason.startswith(RESUMED):
+            self._tracked.note(RESUMED)
         self.entry = self._keeper.change(entry, PassState.PREPASS, "")
         self._hooks.call(Hook.BEFORE_PASS, self._about(entry))
         self._hooks.call(Hook.DURING_PASS, self._about(entry))

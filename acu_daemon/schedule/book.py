@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from acu_daemon.orbit.timescales import utc_text
-from acu_daemon.schedule.decisions import Decision
+from acu_daemon.schedule.decisions import RESUMED, Decision
 from acu_daemon.schedule.rules import SAME_PASS_S
 
 TOLD_S = 5.0  # a reservation that moves less is not worth a word
@@ -152,6 +152,8 @@ def _difference(old: Entry, new: Entry) -> str:
 
 def _gone(old: Entry, now_tai_s: float, until_tai_s: float) -> Entry:
     """An entry that the new plan does not have."""
+    if old.state is PassState.PLANNED and old.set_tai_s < now_tai_s and old.reason.startswith(RESUMED):
+        return replace(old, state=PassState.FAILED, reason="the daemon ended in mid-pass, and came back too late")
     if old.state is PassState.PLANNED and old.set_tai_s < now_tai_s:
         return replace(old, state=PassState.MISSED, reason=old.reason or "the daemon did not run, or was not ready")
     if old.state in UNDER_WAY and old.set_tai_s < now_tai_s:
