@@ -6,7 +6,7 @@ from typing import Any
 import structlog
 
 from acu_daemon.acu.commands import SetWatchdog, Stop
-from acu_daemon.acu.replies import AcuStatus, Done
+from acu_daemon.acu.replies import AcuStatus, Done, Reply
 from acu_daemon.control.safety.arming import NO_STOP_MODES
 from acu_daemon.daemon.port import AcuPort
 
@@ -36,12 +36,17 @@ async def stop_antenna(port: AcuPort, deadline_s: float, *, clears_watchdog: boo
     return is_stopped
 
 
+def is_left_alone(reply: Reply) -> bool:
+    """Whether a status shows an antenna that somebody else moves by now, or that is in stow: no STOP is sent."""
+    return isinstance(reply, AcuStatus) and (reply.mode in NO_STOP_MODES or not reply.is_remote_enabled)
+
+
 async def _stopped(port: AcuPort) -> AcuStatus:
     """Return the last status before the STOP that was acknowledged, or one that forbids it."""
     log: Any = structlog.get_logger("stop")
     while True:
         status = await port.status()
-        if status.mode in NO_STOP_MODES or not status.is_remote_enabled:
+        if is_left_alone(status):
             log.info("stop.left_alone", mode=status.mode.name)
             return status
         answer = await port.exchange(Stop())

@@ -22,6 +22,7 @@ from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.buffer_keeper import BufferKeeper
 from acu_daemon.daemon.decider import Decider
 from acu_daemon.daemon.service import PassJob, plan_request
+from acu_daemon.daemon.stopping import is_left_alone
 from acu_daemon.edge.tape import Record
 from acu_daemon.edge.tape_text import FitAnswer
 from acu_daemon.errors import OrbitError
@@ -187,7 +188,7 @@ class TapeReplay:
             self._differ("a second command", "none")
 
     def _mean_of_stop(self, record: Record) -> None:
-        """What is no question is STOP, and once that is acknowledged the end of the register watchdog."""
+        """What is no question is STOP, and once that is acknowledged or not called for the end of the watchdog."""
         if record[0] == "Q":
             self._is_question = True
         elif record[0] == "X":
@@ -231,7 +232,8 @@ class TapeReplay:
             return
         is_sure = self._job.driver.is_sure
         self._answer = replace(self._answer, reply=reply, first_byte_tai_s=self._first_byte_tai_s, is_sure=is_sure)
-        self._is_stopped = self._is_stopped or (self.is_ended and isinstance(self._sent, Stop) and reply == Done())
+        is_acknowledged = isinstance(self._sent, Stop) and reply == Done()
+        self._is_stopped = self._is_stopped or (self.is_ended and (is_acknowledged or is_left_alone(reply)))
         if isinstance(self._sent, PointAt) and isinstance(self._meant, PointAndPoll) and isinstance(reply, Done):
             self._next = Poll()
 
