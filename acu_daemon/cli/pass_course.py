@@ -1,8 +1,9 @@
 """The course of the pass that is on: what was seen of it, what hooks hear of that, and how it came out."""
 
 import math
+from collections import deque
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 import structlog
@@ -16,6 +17,7 @@ from acu_daemon.edge.hooks import Hook, HookResult, Hooks
 from acu_daemon.schedule.book import Entry, PassState
 from acu_daemon.schedule.decisions import RESUMED
 
+EARLY_KEPT = 32
 DEGRADED_SHARE = 0.5  # of the useful seconds with the signal
 NO_SIGNAL = "no signal: the satellite was silent, or not where it should be"
 
@@ -60,12 +62,14 @@ class PassCourse:
         self._alarms: frozenset[str] = frozenset()
         self.entry: Entry | None = None
         self.record: dict[str, Any] = {}  # of the pass that is over, for its report; JSON
+        self._early: deque[HookResult] = deque(maxlen=EARLY_KEPT)  # of passes that have not begun
         self._nudges: dict[str, KeptNudge] = {}  # of satellites, until the process ends
         self._log: Any = structlog.get_logger("station")
 
     def begun(self, entry: Entry, phantom: PhantomPass | None) -> None:
         """The run of a pass begins.  phantom: what was found of it before."""
         self._tracked = Tracked(phantom=phantom)
+        self._tracked.hooks += [one for one in self._early if one.number == entry.number]
         if entry.reason.startswith(RESUMED):
             self._tracked.note(RESUMED)
         self.entry = self._keeper.change(entry, PassState.PREPASS, "")
@@ -79,9 +83,8 @@ class PassCourse:
         if new_alarms:
             about = {"alarms": sorted(new_alarms)} | (self._about(self.entry) if self.entry else {})
             self._hooks.call(Hook.ON_ALARM, about)
-        results = self._hooks.take_results()
+        self.gather()
         if self.entry is not None:
-            self._take_results(results)
             self._see_pass(self.entry, seen)
 
     @property
@@ -89,11 +92,18 @@ class PassCourse:
         """How the hooks of the pass ended, so far."""
         return self._tracked.hooks
 
-    def _take_results(self, results: list[HookResult]) -> None:
-        self._tracked.hooks += results
-        for result in results:
-            if not result.is_good:
-                self._tracked.note(f"hook {result.hook}: {result.problem}")
+    def gather(self) -> None:
+        """Put how hooks ended to the pass that is on, to the one that is over, or to those that are to come."""
+        entry = self.entry
+        for result in self._hooks.take_results():
+            if entry is not None and result.number in (entry.number, 0):
+                self._tracked.hooks.append(result)
+                if not result.is_good:
+                    self._tracked.note(f"hook {result.hook}: {result.problem}")
+            elif self.record and result.number == self.record["number"]:
+                self.record["hooks"].append(result.record)
+            elif result.number:
+                self._early.append(result)
 
     def _see_pass(self, entry: Entry, seen: Snapshot) -> None:
         tracked = self._tracked
@@ -120,13 +130,14 @@ class PassCourse:
         """The run of a pass is over; outcome None: it ended by an error, the reason."""
         if self.entry is None:
             return
+        self.gather()
         entry = self._keeper.change(self.entry, PassState.POSTPASS, "")
         self._keep_nudge(entry.satellite)
         state, why = self._judged(entry, outcome, reason)
         changed = self._keeper.change(entry, state, why)
         self._hooks.end_during()
         self.record = self._about(changed) | self._recorded(state, why)
-        self._hooks.call(Hook.AFTER_PASS, self.record)
+        self._hooks.call(Hook.AFTER_PASS, self.record | {"hooks": list(self.record["hooks"])})
         self._log.info("pass.done", entry=changed.name, state=str(state), reason=why)
         self.entry = None
 
@@ -163,7 +174,7 @@ class PassCourse:
             "reason": why,
             "locked_s": round(tracked.locked_s, 1),
             "phantom": None if tracked.phantom is None else tracked.phantom.record,
-            "hooks": [asdict(one) for one in tracked.hooks],
+            "hooks": [one.record for one in tracked.hooks],
         }
 
     def _judged(self, entry: Entry, outcome: Outcome | None, reason: str) -> tuple[PassState, str]:

@@ -17,8 +17,6 @@ from acu_daemon.edge.tape_file import TapeFile
 from acu_daemon.edge.writer import Writer
 from acu_daemon.errors import ElementsError
 
-SAID_CHARACTERS = 300
-
 
 def begin_tape(
     directory: Path, target: Target, job: PassJob, link: Link, now_tai_s: float, files: Writer
@@ -41,9 +39,7 @@ def begin_tape(
 def note_hooks(tape: TapeFile, results: Iterable[HookResult]) -> None:
     """Put how hooks ended into a recording, for its report."""
     for one in results:
-        lasted_s = round(one.lasted_s, 2)
-        said = {"hook": str(one.hook), "status": one.status, "lasted_s": lasted_s, "problem": one.problem}
-        tape.note(("I", "hook", {**said, "said": one.said.strip()[-SAID_CHARACTERS:]}))
+        tape.note(("I", "hook", one.record))
 
 
 def _remove_old(folder: Path, rules: KeepRules) -> None:

@@ -8,11 +8,13 @@ import typer
 
 from acu_daemon.cli.outputs import refuse_unwritable
 from acu_daemon.cli.pass_messages import write_messages
+from acu_daemon.cli.pass_record import read_record
 from acu_daemon.cli.replay_wire import ReplayedPass, replay_pass
 from acu_daemon.edge.tape_file import SUFFIX
 from acu_daemon.edge.writer import replace_file
 from acu_daemon.report.pass_figures import pass_figures
 from acu_daemon.report.pass_page import pass_page
+from acu_daemon.report.pass_station import station_figures
 from acu_daemon.report.pass_watch import PassWatch
 from acu_daemon.report.passes_index import index_figures, index_page
 
@@ -73,6 +75,10 @@ def make_report(path: Path, folder: Path, config: Path | None = None) -> tuple[R
         "is_same": done.difference is None,
         "difference": None if done.difference is None else str(done.difference),
     }
+    record = read_record(path)
+    figures["station"] = None if record is None else station_figures(record, done.taped.job, watch)
+    if record is not None:
+        figures["hooks"] = list(record.hooks)  # of the recording: those that had ended when it was closed
     name = path.name.removesuffix(SUFFIX)
     page, data = folder / f"{name}.html", folder / f"{name}.json"
     refuse_unwritable(page, data)

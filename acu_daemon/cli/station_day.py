@@ -211,6 +211,7 @@ class StationDay:
         """What hooks are told."""
         return {
             "station": self.station.station.name,
+            "number": entry.number,
             "satellite": entry.satellite,
             "rise_utc": utc_text(entry.rise_tai_s),
             "set_utc": utc_text(entry.set_tai_s),

@@ -13,6 +13,7 @@ from acu_daemon.cli.kept import Kept, open_kept
 from acu_daemon.cli.options import Target
 from acu_daemon.cli.outlets_beside import Outlets
 from acu_daemon.cli.page import RunningPage, WatchedRuns, passes_shown
+from acu_daemon.cli.pass_reports import PassReports
 from acu_daemon.cli.pass_tape import begin_tape, note_hooks
 from acu_daemon.cli.run_setup import make_job
 from acu_daemon.cli.station_day import StationDay
@@ -81,7 +82,7 @@ class StationRuns:
         self._service: Service | None = None
         self._kept: Kept | None = None
         self._tape: TapeFile | None = None  # of the pass in progress
-        self._reports: set[asyncio.Task[None]] = set()  # that are in the making
+        self._reports = PassReports(setup, self.day)
         self._memory: ControlState | None = None
         self._stop_reason = ""
         self._is_resting = False
@@ -215,22 +216,20 @@ class StationRuns:
         except AcuDaemonError as error:
             self.day.course.ended(None, str(error))
             raise
+        else:
+            self.day.course.ended(outcome)
         finally:
             self._end_tape(target)
-        self.day.course.ended(outcome)
         return replace(outcome, reason="cut as planned") if is_cut and outcome.reason == "duration over" else outcome
 
     def _end_tape(self, target: Target) -> None:
         """Close the recording, and have the report made beside what comes next."""
-        tape, setup = self._tape, self._setup
+        tape = self._tape
         if tape is None:
             return
         note_hooks(tape, self.day.course.hook_results)
         tape.close()
-        if target.station.recording.report and not tape.problem:
-            making = asyncio.create_task(setup.report(tape, setup.files, setup.config), name="report")
-            self._reports.add(making)
-            making.add_done_callback(self._reports.discard)
+        self._reports.make(tape, has_report=target.station.recording.report and not tape.problem)
 
     async def _move(self, az_deg: float, el_deg: float) -> Outcome:
         now_tai_s = self._setup.clock.tai_s()
@@ -361,9 +360,7 @@ class StationRuns:
     async def close(self) -> None:
         """End what runs beside the runs."""
         await self.day.close()
-        for making in self._reports:
-            making.cancel()
-        await asyncio.gather(*self._reports, return_exceptions=True)
+        await self._reports.close()
         if self._kept is not None:
             self._kept.flush()
         self._notifier.close()

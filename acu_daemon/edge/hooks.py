@@ -11,7 +11,7 @@ import json
 import os
 import signal
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
@@ -23,6 +23,7 @@ KEPT_BYTES = 2000  # of what a hook prints
 MOST_BYTES = 65536  # it may print; then nobody reads on
 GRACE_S = 3.0  # between SIGTERM and SIGKILL
 MOST_RUNNING = 16
+SAID_CHARACTERS = 300  # the last of them are kept for the report
 _OURS = (
     "NOTIFY_SOCKET",
     "WATCHDOG_PID",
@@ -49,17 +50,32 @@ class Hook(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class HookResult:
-    """How a hook ended.  status: its exit status, -N for signal N, None where it was never started."""
+    """How a hook ended.  status: its exit status, -N for signal N, None where it was never started.
+
+    number: of the pass in the schedule; 0: it was about none.
+    """
 
     hook: Hook
     status: int | None
     lasted_s: float
     said: str  # the last of what it printed
     problem: str = ""  # in words; "": all is well
+    number: int = 0
 
     @property
     def is_good(self) -> bool:
         return self.problem == ""
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """For the report of the pass; JSON."""
+        return {
+            "hook": str(self.hook),
+            "status": self.status,
+            "lasted_s": round(self.lasted_s, 2),
+            "problem": self.problem,
+            "said": self.said.strip()[-SAID_CHARACTERS:],
+        }
 
 
 class Hooks:
@@ -68,25 +84,35 @@ class Hooks:
     def __init__(self, commands: Mapping[Hook, Sequence[str]], time_limit_s: float) -> None:
         self._commands = {hook: tuple(command) for hook, command in commands.items() if command}
         self._time_limit_s = time_limit_s
-        self._running: set[asyncio.Task[HookResult]] = set()
+        self._running: dict[asyncio.Task[HookResult], tuple[Hook, int]] = {}  # and the number of its pass
         self._during: asyncio.Task[HookResult] | None = None
         self._results: list[HookResult] = []
         self._log: Any = structlog.get_logger("hooks")
 
     def call(self, hook: Hook, about: Mapping[str, Any]) -> None:
-        """Start a hook, if there is one.  Never waits."""
+        """Start a hook, if there is one.  Never waits.  about: `number` in it is that of the pass."""
         command = self._commands.get(hook)
         if command is None:
             return
         if len(self._running) >= MOST_RUNNING:
-            self._end(HookResult(hook, None, 0.0, "", f"not started: {MOST_RUNNING} hooks are running"))
+            why = f"not started: {MOST_RUNNING} hooks are running"
+            self._end(HookResult(hook, None, 0.0, "", why, about.get("number", 0)))
             return
         limit_s = None if hook is Hook.DURING_PASS else self._time_limit_s
         task = asyncio.create_task(self._follow(hook, command, about, limit_s), name=f"hook {hook}")
-        self._running.add(task)
-        task.add_done_callback(self._running.discard)
+        self._running[task] = hook, about.get("number", 0)
+        task.add_done_callback(self._running.pop)
         if hook is Hook.DURING_PASS:
             self._during = task
+
+    def running(self, number: int) -> list[Hook]:
+        """The hooks of a pass that have not ended."""
+        return [hook for task, (hook, of) in self._running.items() if of == number and not task.done()]
+
+    async def ended(self, number: int, longest_s: float) -> None:
+        """Wait for the hooks of a pass."""
+        if tasks := [task for task, (_, of) in self._running.items() if of == number]:
+            await asyncio.wait(tasks, timeout=longest_s)
 
     def end_during(self) -> None:
         """End what runs during a pass: SIGTERM, and SIGKILL where that is not enough."""
@@ -108,7 +134,7 @@ class Hooks:
     async def _follow(
         self, hook: Hook, command: Sequence[str], about: Mapping[str, Any], limit_s: float | None
     ) -> HookResult:
-        result = await self._run(hook, command, about, limit_s)
+        result = replace(await self._run(hook, command, about, limit_s), number=about.get("number", 0))
         self._end(result)
         return result
 

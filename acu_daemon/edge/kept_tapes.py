@@ -15,7 +15,8 @@ from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.units import DAY_S
 
 _LONGEST_NAME = 40
-MESSAGES = (".tdm", ".omm", ".oem")  # of the pass, which go with its recording
+STATION = ".station.json"  # what the station knows of a pass beside its recording
+MESSAGES = (".tdm", ".omm", ".oem", STATION)  # of the pass, which go with its recording
 PASSES = "passes"  # the folder in a state directory
 
 
@@ -63,7 +64,7 @@ def remove_old(directory: Path, rules: KeepRules, now_unix_s: float | None = Non
 
 
 def messages_beside(tape: Path) -> list[Path]:
-    """The messages of a recording's pass."""
+    """The messages of a recording's pass, and what the station said of it."""
     name = tape.name.removesuffix(SUFFIX)
     return [path for path in (tape.with_name(name + ending) for ending in MESSAGES) if path.exists()]
 

@@ -10,6 +10,7 @@ from acu_daemon.report.pass_sections import (
     line_section,
     residuals_section,
 )
+from acu_daemon.report.pass_station import station_section
 from acu_daemon.report.svg_chart import sky_chart
 
 
@@ -22,6 +23,7 @@ def pass_page(figures: Figures) -> str:
             _head(figures, when),
             _tiles(figures),
             _sky_and_plan(figures),
+            station_section(figures),
             course_section(figures),
             _losses(figures),
             residuals_section(figures),
@@ -162,6 +164,8 @@ def _rest(figures: Figures) -> str:
         )
         for one in figures["hooks"]
     ]
+    running = figures["station"]["running_hooks"] if figures["station"] else []
+    hooks += [(escape(one), text(None), text(None), "still running when the report was made") for one in running]
     events = [
         (time_of_day(one["utc"]), escape(one["name"]), escape(one["said"]), text(one["count"]))
         for one in figures["events"]
