@@ -77,11 +77,12 @@ def _lost(one: LostSpan, seen: Sequence[SeenReading], half_deg: float) -> dict[s
 
 def _seconds(readings: Sequence[SeenReading], half_deg: float, *, is_near: bool) -> float:
     """How long the antenna was within half the beam of the path, or out of it; a gap counts as a tick or two."""
-    return sum(
+    spans = [
         min(after.tai_s - one.tai_s, LONGEST_GAP_S)
         for one, after in pairwise(readings)
         if one.off_path_deg is not None and (one.off_path_deg <= half_deg) == is_near
-    )
+    ]
+    return sum(spans, 0.0)
 
 
 def station_section(figures: Figures) -> str:
