@@ -67,7 +67,7 @@ def serve() -> None:
             else:
                 reply = refitter.refit(request)
         except (OrbitError, ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
-            reply = f"it failed: {error}"
+            reply = f"the {'plan' if isinstance(request, PlanRequest) else 'fit'} failed: {error}"
         data = pickle.dumps(reply, protocol=pickle.HIGHEST_PROTOCOL)
         replies.write(LENGTH.pack(len(data)) + data)
         replies.flush()
