@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import structlog
@@ -24,8 +24,10 @@ from acu_daemon.units import DAY_S, Array
 from acu_daemon.web.feed import Feed
 from acu_daemon.web.guard import read_token
 from acu_daemon.web.order_desk import OrderDesk
-from acu_daemon.web.page_server import PageServer
 from acu_daemon.web.recent_events import RecentEvents
+
+if TYPE_CHECKING:  # with its server of pages it takes a fifth of what a daemon needs to start
+    from acu_daemon.web.page_server import PageServer
 
 OFF = "off"
 SHOWN_BEFORE_S, SHOWN_MOST = 3600.0, 40  # of the schedule
@@ -87,6 +89,8 @@ class RunningPage:
             return
         now_s = clock.monotonic_s
         self._feed = Feed(watched, frame.events, frame.lease, now_s, may_order=choice.token is not None)
+        from acu_daemon.web.page_server import PageServer
+
         desk = OrderDesk(watched.answer, frame.lease, now_s, self._feed.acknowledge)
         self._server = PageServer(self._feed, desk, clock, names=choice.names, token=choice.token)
 
