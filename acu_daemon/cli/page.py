@@ -89,10 +89,10 @@ class RunningPage:
             return
         now_s = clock.monotonic_s
         self._feed = Feed(watched, frame.events, frame.lease, now_s, may_order=choice.token is not None)
-        from acu_daemon.web.page_server import PageServer
+        from acu_daemon.web import page_server
 
         desk = OrderDesk(watched.answer, frame.lease, now_s, self._feed.acknowledge)
-        self._server = PageServer(self._feed, desk, clock, names=choice.names, token=choice.token)
+        self._server = page_server.PageServer(self._feed, desk, clock, names=choice.names, token=choice.token)
 
     async def open(self) -> None:
         """Listen; where it cannot, say so and go on: the antenna matters more."""
