@@ -121,6 +121,7 @@ class Crashes:
         wait_until(lambda: rig.state == "HOLD/FITTED")
         for number in range(len(LOADS)):
             self.sleep_until(FIRST_KILL_S[rig.link] + number * APART_S)
+            wait_until(lambda: rig.state == "HOLD/FITTED")  # a starved machine may still be on its way back
             self.crash()
         self.sleep_until(LOSS_S[1])
         wait_until(lambda: rig.state == "AUTOTRACK/FITTED")
