@@ -20,6 +20,11 @@ class AcuDaemonError(Exception):
     """Base of everything this package raises on purpose."""
 
 
+def failure_text(error: Exception) -> str:
+    """Why something failed: what was raised on purpose says it itself, of anything else the kind is told too."""
+    return str(error) if isinstance(error, AcuDaemonError) else f"{type(error).__name__}: {error}"
+
+
 class UsageError(AcuDaemonError):
     """Wrong use: the message says what to do instead."""
 

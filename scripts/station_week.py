@@ -128,6 +128,7 @@ def run_week(config: Path, state: Path, begin_tai_s: float, days: int) -> Week:
     state.mkdir()
     foreground.REST_S, schedule_keeper.PLAN_S = 5.0, 1800.0
     begun_s, now_tai_s, end_tai_s = time.process_time(), begin_tai_s, begin_tai_s + days * DAY_S
+    done = None
     events, kills = happenings(config, begin_tai_s, days), 0
     blow(config, CALM, now_tai_s)
     while now_tai_s < end_tai_s:
@@ -135,7 +136,9 @@ def run_week(config: Path, state: Path, begin_tai_s: float, days: int) -> Week:
         script: list[tuple[float, Action]] = [one for one in events if now_tai_s <= one[0]]
         if kill_tai_s is not None:
             script.append((kill_tai_s, _kill))
-        done = run_days(config, state, now_tai_s, end_tai_s, script=script, has_phantom=True, keeps_rows=False)
+        done = run_days(
+            config, state, now_tai_s, end_tai_s, script=script, has_phantom=True, keeps_rows=False, before=done
+        )
         print(f"until {utc_text(kill_tai_s or end_tai_s, 0)}: {time.process_time() - begun_s:.0f} s", file=sys.stderr)
         if done.outcome is not None or kill_tai_s is None:
             break

@@ -1,5 +1,6 @@
 """A clock that is set after the start is obeyed before the pass, not in it; one that cannot be right is waited for."""
 
+from collections.abc import Callable
 from math import inf
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import acu_daemon.cli as cli
 from acu_daemon.acu.commands import Stop
 from acu_daemon.cli.clock_wait import wait_for_clock
 from acu_daemon.cli.options import coming_pass, load_target
+from acu_daemon.daemon.service import Service
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.clock_sense import before_elements, before_release
 from acu_daemon.errors import UsageError
@@ -52,6 +54,29 @@ def test_what_people_told_the_daemon_before_the_clock_was_set_holds_after_it(tmp
     actions = [(5.0, disarm), (8.0, lambda story: story.step(60.0))]
     told = tell(Story(DEMO, RISE_TAI_S - 400.0, 20.0, slow_s=60.0, actions=actions), tmp_path / "state")
     assert len(told.jobs) == 2
+    assert (told.snapshots[-1].arming, told.snapshots[-1].disarmed_by) == ("disarmed", "a person")
+
+
+def between_runs(monkeypatch: pytest.MonkeyPatch, do: Callable[[], None]) -> None:
+    """Have something done after the last tick of each run, before the next one is there."""
+    end = Service._end
+
+    async def after_the_last_tick(service: Service) -> bool:
+        do()
+        return await end(service)
+
+    monkeypatch.setattr(Service, "_end", after_the_last_tick)
+
+
+def test_what_people_say_between_two_runs_is_for_the_next_and_after_the_last_it_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers: list[str] = []
+    told = Story(DEMO, RISE_TAI_S - 400.0, 20.0, slow_s=60.0, actions=[(8.0, lambda story: story.step(60.0))])
+    between_runs(monkeypatch, lambda: answers.append(told.runs.answer("disarm") if told.runs else ""))
+    tell(told, tmp_path / "state")
+    assert len(told.jobs) == 2
+    assert [answer.split(" ")[0] for answer in answers] == ["ok", "error"]
     assert (told.snapshots[-1].arming, told.snapshots[-1].disarmed_by) == ("disarmed", "a person")
 
 

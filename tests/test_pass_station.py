@@ -132,7 +132,9 @@ async def test_the_report_is_made_after_a_hook_that_ends_late_and_the_file_is_th
     go_on, read_at_report = tmp_path / "go-on", []
     wait = f'while [ ! -e "{go_on}" ]; do sleep 0.05; done; echo sent'
     hooks = Hooks({Hook.AFTER_PASS: ["/bin/sh", "-c", wait]}, 60.0)
-    entry: Any = SimpleNamespace(number=7, satellite="scd", name="scd", useful_s=0.0, reason="", state=PassState.PASS)
+    entry: Any = SimpleNamespace(
+        number=7, satellite="scd", name="scd", useful_s=0.0, reason="", is_resumed=False, state=PassState.PASS
+    )
     keeper: Any = SimpleNamespace(change=lambda given, _state, _reason: given)
     course = PassCourse(keeper, hooks, lambda one: {"number": one.number})
     course.begun(entry, None)

@@ -123,7 +123,9 @@ def test_a_kill_in_mid_pass_is_gone_on_from_and_nothing_is_lost(tmp_path: Path) 
     killed_at = START + 240.0
     before = run_days(config, state, START, START + 420.0, script=[(killed_at, kill)])
     assert before.outcome is None
-    run_days(config, state, killed_at + 1.0, START + 420.0)
+    assert before.rows[-1].mode is AcuMode.AUTOTRACK
+    after = run_days(config, state, killed_at + 1.0, START + 420.0, before=before)
+    assert {row.mode for row in after.rows if row.tai_s < killed_at + 30.0} == {AcuMode.AUTOTRACK}
     with ScheduleFile(state, is_read_only=True) as file:
         [scd] = [one for one in file.book(START) if one.satellite == "scd" and one.rise_tai_s < START + 2400.0]
     assert scd.state in (PassState.DONE, PassState.DEGRADED), scd

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+from test_clock_set_late import between_runs
 from test_station import START, night
 from test_station_stow import RISE, modes, says
 
@@ -45,6 +47,25 @@ def test_a_pause_begins_no_pass_and_what_it_costs_is_cancelled_by_name(tmp_path:
     assert [one.split(":")[0] for one in answers] == [f"ok no pass is begun until {until[:13]}", "error until 'soon'"]
     assert (found.of("scd").state, found.of("scd").reason) == (PassState.CANCELLED, f"paused by a person until {until}")
     assert modes(found, START, RISE + 80.0) == {AcuMode.STANDBY}
+
+
+def test_what_a_person_says_after_the_last_tick_of_a_pass_is_for_the_rest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The safe stop takes a while; what was said in it was answered with ok, and lost."""
+    answers: list[str] = []
+    heard: list[StationAccess] = []
+
+    def say() -> None:
+        if answers == ["ok given up: scd of 1989-02-01T02:06:26Z"]:
+            says("stow", answers)(heard[0])
+
+    between_runs(monkeypatch, say)
+    script = [(START, heard.append), (RISE + 15.0, says("skip", answers))]
+    found = night(tmp_path, minutes=ENDS_S, script=script)
+    assert answers[1].startswith("ok stowed")
+    assert modes(found, RISE + 50.0, RISE + 80.0) == {AcuMode.STOWED}
+    assert [one["by"] for one in found.days.named("stow.begins")] == ["operator"]
 
 
 def test_a_nudge_that_is_kept_is_of_the_satellite_while_its_elements_hold(tmp_path: Path) -> None:

@@ -2,14 +2,19 @@
 
 from pathlib import Path
 
+import pytest
 from config_files import BROUWER, write
 from test_station import BEHIND, HIGH, START, Night
 from test_station_stow import RISE
 
 from acu_daemon.acu.commands import AcuMode
+from acu_daemon.cli.options import Target
+from acu_daemon.cli.station_day import StationDay
 from acu_daemon.cli.virtual_station import StationAccess, run_days
 from acu_daemon.edge.schedule_file import ScheduleFile
-from acu_daemon.schedule.book import PassState
+from acu_daemon.errors import UsageError
+from acu_daemon.model import Pass
+from acu_daemon.schedule.book import Entry, PassState
 from acu_daemon.schedule.rules import PassRequest, Wish
 
 ENDS = START + 312.0
@@ -45,6 +50,27 @@ def test_one_that_may_interrupt_takes_the_antenna_over_without_a_stop_between(tm
     assert after <= {AcuMode.AUTOTRACK, AcuMode.REMOTE, AcuMode.ACQUIRE, AcuMode.REMOTE_BACKUP}
     assert found.days.rows[-1].beam_error_deg is not None
     assert found.days.named("stop.done")[-1:] != []
+
+
+def test_where_the_one_that_interrupts_cannot_begin_the_antenna_is_stopped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing is told the ACU when a pass is given up for another: it would go on, and nobody look after it."""
+    begin = StationDay.begin
+
+    def refused(day: StationDay, entry: Entry) -> tuple[Target, Pass]:
+        if entry.satellite == "behind":
+            raise UsageError("a file is spoilt")
+        return begin(day, entry)
+
+    monkeypatch.setattr(StationDay, "begin", refused)
+    found = forced(tmp_path, may=True)
+    given_up = next(one for one in found.days.events if one["event"] == "pass.done")
+    assert "given up for behind" in given_up["reason"]
+    assert found.days.named("stop.done") != []
+    assert found.days.rows[-1].mode is AcuMode.STANDBY
+    assert found.days.named("foreign.stop") == []
+    assert found.of("behind").state is PassState.PLANNED
 
 
 def test_one_whose_file_says_nothing_of_it_waits_though_a_person_forces_it(tmp_path: Path) -> None:

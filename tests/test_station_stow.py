@@ -57,11 +57,12 @@ def test_a_kill_while_stowed_for_the_wind_forgets_neither_the_stow_nor_how_calm_
     config, state = configured(tmp_path / "config", watched(tmp_path, "max_age_s = 600\n")), tmp_path / "state"
     state.mkdir()
     begin = [(START, blows(tmp_path, STRONG)), (START + 60.0, kill)]
-    run_days(config, state, START, START + 70.0, script=begin)
+    killed = run_days(config, state, START, START + 70.0, script=begin)
     assert (state / STOWED).read_text().startswith("wind\n")
     breeze = (10.0, 12.0)  # below the limits, above what they must fall to
-    days = run_days(config, state, START + 65.0, START + 360.0, script=[(START + 65.5, blows(tmp_path, breeze))])
-    assert {row.mode for row in days.rows if row.tai_s > START + 80.0} <= set(STOW_MODES)
+    script = [(START + 65.5, blows(tmp_path, breeze))]
+    days = run_days(config, state, START + 65.0, START + 360.0, script=script, before=killed)
+    assert {row.mode for row in days.rows} <= set(STOW_MODES)
     with ScheduleFile(state, is_read_only=True) as file:
         [scd] = [one for one in file.book(START) if one.satellite == "scd" and one.rise_tai_s < START + 2400.0]
     assert (scd.state, scd.reason.split(",")[0]) == (PassState.FAILED, "not begun: wind strong")

@@ -32,13 +32,13 @@ def test_nothing_is_lost_and_what_is_not_tracked_has_its_reason(
     state.mkdir()
     answers: list[str] = []
     begin = [(START + 150.0, blows(tmp_path, week.CALM)), (RISE + 70.0, kill)]
-    run_days(config, state, START + 150.0, ENDS, script=begin, keeps_rows=False)
+    killed = run_days(config, state, START + 150.0, ENDS, script=begin, keeps_rows=False)
     after = [
         (RISE + 500.0, blows(tmp_path, week.STRONG)),
         (RISE + 900.0, blows(tmp_path, week.CALM)),
         (RISE + 1000.0, says(f"pause until={utc_text(RISE + 1200.0, 0)}", answers)),
     ]
-    days = run_days(config, state, RISE + 90.0, ENDS, script=after, keeps_rows=False)
+    days = run_days(config, state, RISE + 90.0, ENDS, script=after, keeps_rows=False, before=killed)
     with ScheduleFile(state, is_read_only=True) as file:
         book = [one for one in file.book(START) if one.set_tai_s < ENDS - 10.0]
         granted = {one.number for one in book if any(s == "planned" for _, s, _ in file.history(one.number))}

@@ -8,6 +8,7 @@ from typing import Any
 import structlog
 
 from acu_daemon.cli.station_wind import Beside
+from acu_daemon.errors import failure_text
 from acu_daemon.schedule.book import Entry
 
 CHECKS_S = (300.0, 60.0)  # before the rise
@@ -32,7 +33,7 @@ class PassChecks:
         if self._checking is not None:
             if self._checking.done():
                 done, self._checking = self._checking, None
-                self._find(entry, "; ".join(done.result()))
+                self._find(entry, self._result(done))
             return
         before_s = entry.rise_tai_s - now_tai_s
         if self._entry is None or self._entry.number != entry.number:
@@ -41,6 +42,13 @@ class PassChecks:
         if is_time or (self.no_go and now_tai_s >= self._again_tai_s):
             self._entry, self._before_s = entry, before_s
             self._checking = asyncio.create_task(self._beside(self._check, entry.satellite, now_tai_s), name="check")
+
+    def _result(self, done: asyncio.Task[list[str]]) -> str:
+        """What is a no-go; a check that fails itself is one, and ends no station."""
+        try:
+            return "; ".join(done.result())
+        except Exception as error:  # noqa: BLE001
+            return f"the check failed: {failure_text(error)}"
 
     def _find(self, entry: Entry, no_go: str) -> None:
         self.no_go = no_go

@@ -1,6 +1,7 @@
 """The course of the pass that is on: what was seen of it, what hooks hear of that, and how it came out."""
 
 import math
+import re
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -19,6 +20,7 @@ from acu_daemon.schedule.decisions import RESUMED
 
 EARLY_KEPT = 32
 DEGRADED_SHARE = 0.5  # of the useful seconds with the signal
+FIGURES = re.compile(r"[-+]?\d[\d.:]*")
 NO_SIGNAL = "no signal: the satellite was silent, or not where it should be"
 
 
@@ -59,7 +61,7 @@ class PassCourse:
     def __init__(self, keeper: ScheduleKeeper, hooks: Hooks, about: Callable[[Entry], dict[str, Any]]) -> None:
         self._keeper, self._hooks, self._about = keeper, hooks, about
         self._tracked = Tracked()
-        self._alarms: frozenset[str] = frozenset()
+        self._alarms: dict[str, str] = {}  # by their texts without figures, such as since when they last
         self.entry: Entry | None = None
         self.record: dict[str, Any] = {}  # of the pass that is over, for its report; JSON
         self._early: deque[HookResult] = deque(maxlen=EARLY_KEPT)  # of passes that have not begun
@@ -70,7 +72,7 @@ class PassCourse:
         """The run of a pass begins.  phantom: what was found of it before."""
         self._tracked = Tracked(phantom=phantom)
         self._tracked.hooks += [one for one in self._early if one.number == entry.number]
-        if entry.reason.startswith(RESUMED):
+        if entry.is_resumed:
             self._tracked.note(RESUMED)
         self.entry = self._keeper.change(entry, PassState.PREPASS, "")
         self._hooks.call(Hook.BEFORE_PASS, self._about(entry))
@@ -78,10 +80,9 @@ class PassCourse:
 
     def see(self, seen: Snapshot) -> None:
         """Take the newest snapshot, of a pass or between passes."""
-        now_alarms = frozenset(alarms(seen))
-        new_alarms, self._alarms = now_alarms - self._alarms, now_alarms
-        if new_alarms:
-            about = {"alarms": sorted(new_alarms)} | (self._about(self.entry) if self.entry else {})
+        before, self._alarms = self._alarms, {FIGURES.sub("", text): text for text in alarms(seen)}
+        if begun := sorted(text for kind, text in self._alarms.items() if kind not in before):
+            about = {"alarms": begun} | (self._about(self.entry) if self.entry else {})
             self._hooks.call(Hook.ON_ALARM, about)
         self.gather()
         if self.entry is not None:
@@ -183,7 +184,7 @@ class PassCourse:
         if self._tracked.cancelled_by:
             return PassState.CANCELLED, f"skipped by {self._tracked.cancelled_by}"
         tracked, words = self._tracked, "; ".join(self._tracked.words)
-        cause = words or "; ".join(sorted(self._alarms))
+        cause = words or "; ".join(sorted(self._alarms.values()))
         if not tracked.is_told_of_signal:
             state, said = self._judged_by_path(entry, cause)
         elif not outcome.has_acquired and tracked.locked_s == 0.0:

@@ -11,7 +11,7 @@ from acu_daemon.cli.pass_checks import CHECKS_S
 from acu_daemon.cli.station_wind import Beside
 from acu_daemon.config.to_settings import control_config, driver_of, keyhole_rules, leaning, planned_tilt
 from acu_daemon.control.phantom import PhantomPass, fly_phantom
-from acu_daemon.errors import AcuDaemonError
+from acu_daemon.errors import failure_text
 from acu_daemon.pointing.wrap import middle_deg, nearest_turn
 from acu_daemon.schedule.book import Entry
 
@@ -41,8 +41,8 @@ class PhantomCheck:
         flown, self._flying = self._flying, None
         try:
             self.found = flown.result()
-        except AcuDaemonError as error:
-            self._log.warning("phantom.not_flown", entry=entry.name, reason=str(error))
+        except Exception as error:  # noqa: BLE001  a pass that cannot be flown before it is tracked all the same
+            self._log.warning("phantom.not_flown", entry=entry.name, reason=failure_text(error))
             return
         tell = self._log.warning if self.found.lost or self.found.no_go else self._log.info
         tell("phantom.flown", entry=entry.name, what=str(self.found), told="; ".join(self.found.told))

@@ -17,7 +17,7 @@ from acu_daemon.config.station_tables import StationFile
 from acu_daemon.daemon.tally import Tally
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.schedule_file import ScheduleFile, Words
-from acu_daemon.errors import AcuDaemonError
+from acu_daemon.errors import AcuDaemonError, UsageError, failure_text
 from acu_daemon.schedule.book import OVER, UNDER_WAY, Entry, PassState, merged, paused
 from acu_daemon.schedule.decisions import RESUMED
 from acu_daemon.schedule.exact_plan import Slot
@@ -49,13 +49,14 @@ class ScheduleKeeper:
         self._planning: asyncio.Task[StationPlan] | None = None
         self._hearing: asyncio.Task[Words] | None = None
         self._heard_tai_s = -math.inf
+        self._unread = ""  # why people's words cannot be read
         self._interrupters: frozenset[str] = frozenset()  # satellites that may interrupt
         self._log: Any = structlog.get_logger("station")
 
     @property
     def problem(self) -> str:
-        """What of the schedule cannot be written."""
-        return self._file.problem
+        """What of the schedule cannot be written, or read."""
+        return self._file.problem or self._unread
 
     def close(self) -> None:
         """End what runs beside the loop."""
@@ -74,7 +75,7 @@ class ScheduleKeeper:
 
     def look(self, now_tai_s: float) -> None:
         """Look at people's words, and plan anew where it is time; the new plan is taken at a later look."""
-        words = self._file.words()
+        words = self._read_words()
         if words != self.words:
             self.words = words
             self.anew_reason = WORD
@@ -92,6 +93,17 @@ class ScheduleKeeper:
                 self._put_off(now_tai_s)
                 return
         self._planning = asyncio.create_task(self._beside(self._plan, now_tai_s), name="plan")
+
+    def _read_words(self) -> Words:
+        """What people said; where it cannot be read, what they had said before."""
+        before, self._unread = self._unread, ""
+        try:
+            return self._file.words()
+        except UsageError as error:
+            self._unread = str(error)
+            if self._unread != before:
+                self._log.error("schedule.not_read", reason=self._unread)
+            return self.words
 
     def look_in_pass(self, now_tai_s: float) -> None:
         """Look at people's words, beside the loop; by them alone it is planned anew while a pass is on."""
@@ -117,8 +129,8 @@ class ScheduleKeeper:
         done, self._planning = self._planning, None
         try:
             self._take(done.result())
-        except AcuDaemonError as error:
-            self._log.error("schedule.kept", reason=str(error))
+        except Exception as error:  # noqa: BLE001  whatever spoils a plan, the one before it holds
+            self._log.error("schedule.kept", reason=failure_text(error))
             self._put_off(now_tai_s)
 
     def interrupter(self, running: Entry, now_tai_s: float, lead_s: float) -> Entry | None:
@@ -140,11 +152,7 @@ class ScheduleKeeper:
         self.anew_reason, self._planned_tai_s = "", now_tai_s
 
     def _plan(self, now_tai_s: float) -> StationPlan:
-        resumed = [
-            PassRequest(one.satellite, one.culmination_tai_s, Wish.GO_ON)
-            for one in self.book
-            if one.reason.startswith(RESUMED)
-        ]
+        resumed = [PassRequest(one.satellite, one.culmination_tai_s, Wish.GO_ON) for one in self.book if one.is_resumed]
         frozen = () if self.anew_reason == WORD else tuple(self._frozen.values())  # a word moves what is frozen too
         return station_plan(self._config, now_tai_s, requests=[*resumed, *self.words.requests], frozen=frozen)
 

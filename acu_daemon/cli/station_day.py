@@ -40,6 +40,7 @@ from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.schedule.book import Entry, PassState
 
 SPARE_S = 5.0  # for the start of a pass' run
+BEGINS = " begins"  # behind a pass' name: why a run ends
 
 
 class StationDay:
@@ -115,15 +116,16 @@ class StationDay:
         entry = self.keeper.coming()
         if entry is None or entry.start_tai_s is None or entry.end_tai_s is None:
             return ""
-        self.checks.look(entry, now_tai_s)
-        if self.phantom is not None:
-            self.phantom.look(entry, now_tai_s, self._place)
+        if not entry.is_resumed or self.checks.no_go:
+            self.checks.look(entry, now_tai_s)
+            if self.phantom is not None:
+                self.phantom.look(entry, now_tai_s, self._place)
         if entry.start_tai_s - now_tai_s > self._lead_s(entry) or not self.checks.may_begin(now_tai_s):
             return ""
         if why := self._why_not_now(entry):
             self._refuse(entry, now_tai_s, why)
             return ""
-        return f"{entry.name} begins"
+        return f"{entry.name}{BEGINS}"
 
     def _why_not_now(self, entry: Entry) -> str:
         if self.wind.seen.wants_stow:

@@ -15,6 +15,7 @@ from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.hooks import Hook, Hooks
 
 IN_PLACE_DEG = 0.1
+GONE_ON_S = 10.0  # a move that nobody has wanted for so long is warned of anew
 MOVE_S = 60.0  # so much longer than reckoned a move may take
 FAR_S = 3600.0  # when the pass of a move "rises"
 IN_PLACE = "in place"
@@ -25,21 +26,22 @@ class Horn:
 
     def __init__(self, hooks: Hooks, clock: Clock) -> None:
         self._hooks, self._clock = hooks, clock
-        self._begun_tai_s: float | None = None
+        self._begun_tai_s = self._asked_tai_s = -math.inf
 
     def is_heard(self, about: Mapping[str, Any], for_s: float, *, is_wanted: bool) -> bool:
         """Whether whoever is at the antenna was warned early enough; the first call begins the warning."""
         now_tai_s = self._clock.tai_s()
         if not is_wanted:
             return True
-        if self._begun_tai_s is None:
+        if not 0.0 <= now_tai_s - self._asked_tai_s < GONE_ON_S:  # a no-go put the move off, or the clock was set
             self._begun_tai_s = now_tai_s
             self._hooks.call(Hook.BEFORE_MOVE, about)
+        self._asked_tai_s = now_tai_s
         return now_tai_s - self._begun_tai_s >= for_s
 
     def forget(self) -> None:
         """The antenna moves: the next move is warned of anew."""
-        self._begun_tai_s = None
+        self._asked_tai_s = -math.inf
 
 
 def move_job(job: PassJob, az_deg: float, el_deg: float, now_tai_s: float) -> tuple[PassJob, float]:

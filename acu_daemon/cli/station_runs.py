@@ -16,7 +16,7 @@ from acu_daemon.cli.page import RunningPage, WatchedRuns, passes_shown
 from acu_daemon.cli.pass_reports import PassReports
 from acu_daemon.cli.pass_tape import begin_tape, note_hooks
 from acu_daemon.cli.run_setup import make_job
-from acu_daemon.cli.station_day import StationDay
+from acu_daemon.cli.station_day import BEGINS, StationDay
 from acu_daemon.cli.station_hand import StationHand
 from acu_daemon.cli.station_move import IN_PLACE, Horn, move_job, why_move_ends
 from acu_daemon.cli.station_setup import NoFits, StationSetup
@@ -27,6 +27,7 @@ from acu_daemon.control.tick_input import Asking, NudgeWish, StowWish
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.daemon.health import Health
 from acu_daemon.daemon.live import LiveLine
+from acu_daemon.daemon.operator_requests import ENDS, STATUS
 from acu_daemon.daemon.service import Outcome, PassJob, Service
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.daemon.stopping import DEADLINE_S
@@ -40,9 +41,8 @@ from acu_daemon.edge.tape_file import TapeFile
 from acu_daemon.errors import AcuDaemonError
 from acu_daemon.model import Pass
 from acu_daemon.schedule.book import Entry
-from acu_daemon.schedule.decisions import RESUMED
 
-LED = "a program leads the antenna"
+LED, MOVES = "a program leads the antenna", "the antenna is moved"  # why a rest ends
 LED_BEGINS_S = 30.0  # for the start of its run, modes included
 
 
@@ -110,6 +110,8 @@ class StationRuns:
 
     def answer(self, line: str, who: str = "") -> str:
         """Answer a person's line (daemon.operator_verbs).  who: says it, and from where."""
+        if self._stop_reason and line != STATUS and (self._service is None or self._service.is_over):
+            return ENDS
         return self._hand.answer(line, who, self._service)
 
     async def run(self) -> Outcome:
@@ -121,21 +123,31 @@ class StationRuns:
             self._weather.close()
 
     async def _runs(self) -> Outcome:
-        outcome = await self._pass() if self.day.look() else None
+        outcome = await self._pass() if self.day.look() and self._may_begin() else None
         outcome = outcome or await self._rest()
         while not self._stop_reason and outcome.reason != "duration over":
-            entry = self.day.keeper.coming()
             if outcome.reason == LED:
                 outcome = await self._led()
-            elif outcome.reason.endswith(" begins") and entry is not None:
-                outcome = await self._pass() or replace(outcome, reason="it cannot begin")
-            elif not self._is_placed and isinstance(after := self.day.after(), tuple):
+            elif outcome.reason.endswith(BEGINS):
+                outcome = await self._promised(outcome)
+            elif outcome.reason == MOVES and isinstance(after := self.day.after(), tuple):
                 self._is_placed = True
                 outcome = await self._move(*after)
-            is_handed_over = outcome.reason.endswith(" begins")  # by a pass to another one: nothing rests between them
+            is_handed_over = outcome.reason.endswith(BEGINS)  # by a pass to another one: nothing rests between them
             if not self._stop_reason and outcome.reason != "duration over" and not is_handed_over:
                 outcome = await self._rest()
         return outcome
+
+    async def _promised(self, outcome: Outcome) -> Outcome:
+        """Begin the pass for which a run has ended; where it cannot begin, the antenna is stopped."""
+        entry = self.day.keeper.coming()
+        is_still_due = entry is not None and outcome.reason == f"{entry.name}{BEGINS}"
+        if is_still_due and (ended := await self._pass()) is not None:
+            return ended
+        if self._service is not None:
+            await self._service.stop_after_all()
+            self._memory = self._service.memory
+        return replace(outcome, reason="it cannot begin")
 
     # The three kinds of runs
 
@@ -154,9 +166,7 @@ class StationRuns:
             if self.outlets.wish is not None:
                 return LED
             if why:
-                entry = self.day.keeper.coming()
-                is_resumed = entry is not None and entry.reason.startswith(RESUMED)  # it moved a moment ago
-                return why if entry is None or is_resumed or self._is_warned(self.day.about(entry)) else ""
+                return why if self._may_begin() else ""
             if not self._is_placed and (why := self._after()):
                 return why
             return "another pass is next" if self.day.keeper.coming() != coming else ""
@@ -173,8 +183,13 @@ class StationRuns:
                 self._service.ask(after)
             return ""
         if isinstance(after, tuple) and self._is_warned({"az_deg": after[0], "el_deg": after[1]}):
-            return "the antenna is moved"
+            return MOVES
         return ""
+
+    def _may_begin(self) -> bool:
+        """Whether the pass that is due may begin: the horn was heard, or the antenna moved a moment ago."""
+        entry = self.day.keeper.coming()
+        return entry is None or entry.is_resumed or self._is_warned(self.day.about(entry))
 
     def _is_warned(self, about: dict[str, Any]) -> bool:
         hooks = self.day.station.hooks
@@ -302,10 +317,10 @@ class StationRuns:
             note=self._tape.note if is_pass and self._tape is not None else no_note,
             tally=self.outlets.tally,
         )
-        self._service, self._is_resting = service, job.control.is_resting
-        if self._first_ask is not None:
-            service.ask(self._first_ask)
-            self._first_ask = None
+        first = () if self._first_ask is None else (self._first_ask,)
+        for asking in (*(self._service.unheard if self._service is not None else ()), *first):
+            service.ask(asking)
+        self._service, self._is_resting, self._first_ask = service, job.control.is_resting, None
         if self._stop_reason:
             service.stop(self._stop_reason)
         outcome = await service.run()
@@ -334,7 +349,7 @@ class StationRuns:
         self.day.see(seen)
         self._obey_wind(seen)
         if (entry := self.day.interrupter(seen.tai_s)) is not None and self._service is not None:
-            self._service.hand_over(f"{entry.name} begins")
+            self._service.hand_over(f"{entry.name}{BEGINS}")
         if self._live is not None:
             self._live.show(seen)
         if math.isfinite(self._move_until_tai_s) and self._service is not None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from acu_daemon.acu.commands import AcuMode
+from acu_daemon.cli.options import Target
 from acu_daemon.cli.simulated import tilt_of
 from acu_daemon.cli.station_runs import StationRuns
 from acu_daemon.cli.station_setup import Reporter, StationSetup, first_usable
@@ -35,11 +36,12 @@ Action = Callable[["StationAccess"], None]
 
 @dataclass
 class Days:
-    """What a run of the station left."""
+    """What a run of the station left.  outcome None: it was killed."""
 
     rows: list[TraceRow] = field(default_factory=list)
     events: list[dict[str, Any]] = field(default_factory=list)
     outcome: Outcome | None = None
+    antenna: "tuple[FakeAcu, OneAtATime] | None" = None  # the ACU, and the sky above it
 
     def named(self, name: str) -> list[dict[str, Any]]:
         """Log events of a name."""
@@ -93,11 +95,13 @@ def run_days(
     has_phantom: bool = False,
     keeps_rows: bool = True,
     report: Reporter | None = None,
+    before: Days | None = None,
 ) -> Days:
     """Run the station from one TAI to another; directory: its state.  script: what happens, each at its TAI.
 
-    A script that raises KilledError ends the run there.  keeps_rows: fifty of them a second, too many for a week.
+    A script that raises KilledError ends the run there.  keeps_rows: ten of them a second, too many for a week.
     report: what makes the reports; with it passes are recorded too.
+    before: the run that was killed; its ACU is found as it went on since.
     """
     days = Days()
 
@@ -107,21 +111,8 @@ def run_days(
     async def main() -> None:
         clock = LoopClock(begin_tai_s)
         first = first_usable(config, begin_tai_s)
-        acu_section = first.station.acu
-        sky = OneAtATime(errors)
-        parts = AcuParts(
-            acu_section.azimuth.limits(),
-            acu_section.elevation.limits(),
-            first.station.receiver.beamwidth_deg,
-            sky,
-            begin_tai_s,
-            Scenario(acu=AcuChoice()),
-            1,
-            address_byte(acu_section.address),
-            first.station.site.skyline,
-            tilt_of(first.station),
-        )
-        acu = FakeAcu(parts) if keeps_rows else DozingAcu(parts)
+        antenna = None if before is None else before.antenna
+        acu, sky = days.antenna = antenna or _simulated(first, begin_tai_s, errors, is_dozing=not keeps_rows)
         acu.observer = days.rows.append if keeps_rows else None
         link = MemoryLink(acu, clock)
 
@@ -170,6 +161,23 @@ async def no_report(_tape: TapeFile, _files: Writer, _config: Path) -> None:
     """Make none."""
 
 
+def _simulated(target: Target, begin_tai_s: float, errors: SkyErrors, *, is_dozing: bool) -> tuple[FakeAcu, OneAtATime]:
+    section, station, sky = target.station.acu, target.station, OneAtATime(errors)
+    parts = AcuParts(
+        section.azimuth.limits(),
+        section.elevation.limits(),
+        station.receiver.beamwidth_deg,
+        sky,
+        begin_tai_s,
+        Scenario(acu=AcuChoice()),
+        1,
+        address_byte(section.address),
+        station.site.skyline,
+        tilt_of(station),
+    )
+    return DozingAcu(parts) if is_dozing else FakeAcu(parts), sky
+
+
 def loop_future() -> "asyncio.Future[Any]":
     """A future of the running loop."""
     return asyncio.get_running_loop().create_future()
@@ -179,6 +187,7 @@ def _do(action: Action, access: StationAccess, killed: "asyncio.Future[Any]") ->
     try:
         action(access)
     except KilledError:
+        access.link.is_cut = True  # what still ends in order has no way to the ACU
         if not killed.done():
             killed.set_result(None)
 

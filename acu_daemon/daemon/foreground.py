@@ -29,7 +29,7 @@ from acu_daemon.control.safety.arming import owes_stop
 from acu_daemon.control.safety.interlock import question
 from acu_daemon.control.safety.stow import stow_command
 from acu_daemon.control.state import StartStage, Watchdog
-from acu_daemon.control.tick_input import Arrival, Asking, SlaveWish
+from acu_daemon.control.tick_input import Arrival, Asking, Request, SlaveWish, StowBy, StowWish
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.clock_watch import ClockWatch
 from acu_daemon.daemon.decider import Decider
@@ -52,6 +52,7 @@ LOOK_TICKS = 10  # from look to look at clock and line
 REST_S = 1.0  # from poll to poll between passes
 AWAKE_S = 2.0  # after a person's word or a reply that did not come it polls as in a pass for so long
 TOLD = (SelectMode, SelectBackup, FreeTurnChoice, SetWatchdog, PointAt, Stow)  # commands that the log tells
+OPERATORS = (StowWish(StowBy.OPERATOR), StowWish(StowBy.OPERATOR, is_wanted=False))
 BLIND_S = 1.0  # without a status other replies keep the link no longer than this: they say nothing of the antenna
 
 
@@ -224,6 +225,11 @@ class Foreground:
             return
         self._requests = (*waiting, request)
         self._asked.set()
+
+    @property
+    def unheard(self) -> tuple[Asking, ...]:
+        """What people have asked and no tick has obeyed: the run is over, and the next one's first tick obeys."""
+        return tuple(one for one in self._requests if isinstance(one, Request) or one in OPERATORS)
 
     def _silence_s(self) -> float:
         """On another connection, however soon it came, everything is read again before it is commanded."""

@@ -20,6 +20,7 @@ from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.errors import UsageError
 
 STATUS = "status"
+ENDS = "error the daemon ends, with a safe stop; nothing more is obeyed"
 
 
 class Hands:

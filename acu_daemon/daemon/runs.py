@@ -10,6 +10,7 @@ from typing import Any
 import structlog
 
 from acu_daemon.control.state import ControlState
+from acu_daemon.daemon.operator_requests import ENDS, STATUS
 from acu_daemon.daemon.service import Outcome, Service
 from acu_daemon.errors import AcuDaemonError
 
@@ -33,8 +34,9 @@ class Runs:
         return self._service
 
     def answer(self, line: str, who: str = "") -> str:
-        """Answer a line of the control socket."""
-        return self._service.answer(line, who)
+        """Answer a person's line.  What comes between two runs is for the next one."""
+        is_last = self._service.is_over and (self._is_stopping() or not self._service.anew_reason)
+        return ENDS if is_last and line != STATUS else self._service.answer(line, who)
 
     async def run(self) -> Outcome:
         """Run until one has ended for good.  Raises what Service.run and `begin` raise."""
@@ -45,10 +47,13 @@ class Runs:
                 return outcome
             log.warning("run.anew", reason=self._service.anew_reason)
             try:
-                self._service = self._begin(self._service.memory)
+                before = self._service
+                self._service = self._begin(before.memory)
             except AcuDaemonError:  # such as elements that are too old by the clock that was set
                 await self._service.stop_after_all()
                 raise
+            for asking in before.unheard:
+                self._service.ask(asking)
 
     def _is_stopping(self) -> bool:
         return bool(self._stop_reason)

@@ -276,6 +276,16 @@ class Service:
                 self._is_over.set()
 
     @property
+    def unheard(self) -> tuple[Asking, ...]:
+        """What people have asked since the last tick of a run that is over: for the next run."""
+        return self._foreground.unheard
+
+    @property
+    def is_over(self) -> bool:
+        """Whether no tick is to come."""
+        return self._is_over.is_set()
+
+    @property
     def memory(self) -> ControlState:
         """What of this run's memory another one begins with: what people and the antenna have told."""
         state = self._area.state

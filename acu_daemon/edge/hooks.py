@@ -94,7 +94,7 @@ class Hooks:
         command = self._commands.get(hook)
         if command is None:
             return
-        if len(self._running) >= MOST_RUNNING:
+        if len(self._running) >= MOST_RUNNING and hook is not Hook.BEFORE_MOVE:  # who stands at the antenna is warned
             why = f"not started: {MOST_RUNNING} hooks are running"
             self._end(HookResult(hook, None, 0.0, "", why, about.get("number", 0)))
             return

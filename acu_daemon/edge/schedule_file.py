@@ -140,9 +140,12 @@ class ScheduleFile:
             raise UsageError(f"{self.path}: {error}; nothing was changed") from None
 
     def words(self) -> Words:
-        """What people said, as it stands now."""
-        rows = self._db.execute("select satellite, at_tai_s, wish from requests order by rowid").fetchall()
-        pause = self._db.execute("select until_tai_s from pauses order by rowid desc limit 1").fetchone()
+        """What people said, as it stands now.  UsageError: it cannot be read."""
+        try:
+            rows = self._db.execute("select satellite, at_tai_s, wish from requests order by rowid").fetchall()
+            pause = self._db.execute("select until_tai_s from pauses order by rowid desc limit 1").fetchone()
+        except sqlite3.Error as error:
+            raise UsageError(f"{self.path}: {error}") from None
         requests = tuple(PassRequest(satellite, at_tai_s, Wish(wish)) for satellite, at_tai_s, wish in rows)
         return Words(requests, pause[0]) if pause else Words(requests)
 

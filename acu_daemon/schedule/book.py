@@ -61,6 +61,11 @@ class Entry:
         """For people."""
         return f"{self.satellite} of {utc_text(self.rise_tai_s, 0)[:19]}Z"
 
+    @property
+    def is_resumed(self) -> bool:
+        """Whether it was on when the daemon was killed: checked, and the antenna may be on it still."""
+        return self.reason.startswith(RESUMED)
+
 
 @dataclass(frozen=True, slots=True)
 class Merged:
@@ -152,7 +157,7 @@ def _difference(old: Entry, new: Entry) -> str:
 
 def _gone(old: Entry, now_tai_s: float, until_tai_s: float) -> Entry:
     """An entry that the new plan does not have."""
-    if old.state is PassState.PLANNED and old.set_tai_s < now_tai_s and old.reason.startswith(RESUMED):
+    if old.state is PassState.PLANNED and old.set_tai_s < now_tai_s and old.is_resumed:
         return replace(old, state=PassState.FAILED, reason="the daemon ended in mid-pass, and came back too late")
     if old.state is PassState.PLANNED and old.set_tai_s < now_tai_s:
         return replace(old, state=PassState.MISSED, reason=old.reason or "the daemon did not run, or was not ready")
