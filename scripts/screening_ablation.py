@@ -328,4 +328,6 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    run_script(main)
+    import screening_ablation  # by its name: the processes cannot load what is remembered of `__main__`
+
+    run_script(screening_ablation.main)

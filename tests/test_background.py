@@ -377,6 +377,23 @@ async def test_a_plan_is_made_by_the_fit_process_and_where_that_does_not_answer_
     await asyncio.gather(task, return_exceptions=True)
 
 
+@pytest.mark.parametrize("before_s", [-10.0, 0.0])
+async def test_a_pass_that_is_on_is_planned_at_once_and_the_fit_process_is_not_waited_for(
+    before_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ours = PlanAnswer(replace(PLAN, note="ours"))
+    monkeypatch.setattr(planner, "planned_pass", lambda *_: ours)
+    Predictions(monkeypatch)
+    room = Room(TrackState.IDLE, Sky(None, None, None))
+    room.now = RISE - before_s
+    coming = Pass(RISE, RISE + 100.0, RISE + 200.0, 0.0, 50.0, 90.0, 180.0)
+    room.background.ask_plan(PlanRequest(coming, 0.0, 45.0, CONFIG_HERE.envelope, room.now, 0, SETUP.keyhole))
+    assert room.background.is_planning
+    room.is_due(0.0)
+    assert room.area.sky.plan == ours.plan
+    assert not room.background.is_planning
+
+
 def test_without_the_fit_process_the_next_buffer_is_made_from_what_the_last_one_was() -> None:
     room = Room()
     assert room.background._buffer._in_force(NOW) == (FIT, Model.NEW_FIT)

@@ -25,7 +25,7 @@ from acu_daemon.sim.scenario import AcuChoice
 from acu_daemon.units import wrap_180
 
 AXIS_DEG = 0.1
-AZ_DEG = 0.4  # 0.16 deg on the sky there: an antenna at its limit is noticed after a few readings
+AZ_DEG = 0.2
 HELD_DEG = 0.3  # of the prediction, from 20 s of readings, a minute or two later
 
 

@@ -37,6 +37,7 @@ LEAST_COUNT, ENOUGH = 10, 120  # readings: fewer, or shorter than BEFORE_S, tell
 # Time, seconds
 LEAST_DRIFT_S = 0.5  # a drift over less is noise
 WINDOW_S, WINDOW_COUNT = 3.0, 8  # the newest readings that tell whether offsets are correlated, both at least
+SUSTAINED_S = 0.9  # off the path for so long without a jump, a track was on its way already
 CLEAR_S = 4.0  # off the path for so long, a track shows when it left; so often a reset is considered
 MAX_GAP_S = 6.0  # a longer gap between readings breaks the acquisition: nobody saw what happened
 TRIAL_S = (8.0, 64.0)  # once readings were no orbit's: how long the next ones must be one's, and at most

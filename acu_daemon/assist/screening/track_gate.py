@@ -151,7 +151,7 @@ class TrackGate:
         seen = self._offsets(self._waiting, fit)
         self._waiting_reason = reason_of(seen, rise_db(self.kept, off), self._settings.beamwidth_deg)
         is_rebuilt = False
-        if not self._is_clear and self._waiting.span_s >= limits.CLEAR_S:
+        if not self._is_clear and self._waiting.span_s >= limits.SUSTAINED_S:
             self._is_clear = True
             is_rebuilt = self._take_back(seen, fit)
             if not self._kept:
