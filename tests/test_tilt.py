@@ -9,10 +9,11 @@ from flights import count, flight_of, rows_between, seconds_to_state
 from overhead_flights import SMALL_ERRORS, TOP_TAI_S, errors_deg, lost_s, over_the_zenith, overhead_target
 
 from acu_daemon.acu.commands import PointAndPoll
-from acu_daemon.cli.options import Target, coming_pass
+from acu_daemon.cli.options import Target, coming_pass, longest_lead
 from acu_daemon.config.acu_tables import TiltSection
 from acu_daemon.config.to_settings import keyhole_rules, leaning, planned_tilt
 from acu_daemon.control.tracking.pass_plan import plan_pass
+from acu_daemon.daemon.verdict import alarms
 from acu_daemon.drivers.sa3842.messages import WriteAndPoll
 from acu_daemon.drivers.sa3842.sa3842_driver import wire_command
 from acu_daemon.model import sky_angle_deg
@@ -22,6 +23,7 @@ from acu_daemon.pointing.keep_out import KeepOut
 from acu_daemon.pointing.mount import Mount
 from acu_daemon.pointing.tilt import Tilt
 from acu_daemon.sim.acu import FakeAcu
+from acu_daemon.sim.pedestal import AxisTrouble
 from acu_daemon.sim.scenario import AcuChoice
 from acu_daemon.sim.tilt_axis import leant
 
@@ -115,6 +117,7 @@ def test_a_pass_over_the_zenith_is_autotracked_all_the_way_on_a_leaning_pedestal
     assert "ZENITH" not in flight.states()
 
 
+@pytest.mark.long
 def test_a_loss_is_held_on_a_leaning_pedestal_whose_encoders_are_biased() -> None:
     target = tilting(705, 89.5)
     flight = over_the_zenith(target, before_s=50.0, after_s=30.0, biases_deg=(0.1, 0.1), losses=[(55.0, 78.0)])
@@ -138,11 +141,35 @@ def test_the_antenna_sets_out_so_early_that_the_tilt_is_set_and_acquires_only_th
     flight = flight_of(target, begin, 80.0, antenna=antenna, errors=SMALL_ERRORS, make_acu=make)
     assert seen["acu"].antenna.tilt.angle_deg == pytest.approx(wanted, abs=0.02)
     assert flight.snapshots[-1].tilt == f"{wanted:+.1f} deg, set"
+    assert not any(one.tilt_alarm for one in flight.snapshots)
     waits = [one for one in flight.snapshots if "asked" in one.tilt]
     assert waits
     assert seconds_to_state(flight, "ACQUIRE/TLE", begin) > waits[-1].tai_s - begin
     rows = rows_between(flight, coming.rise_tai_s + 5.0, coming.rise_tai_s + 18.0)
     assert max(row.beam_error_deg or 0.0 for row in rows) < 0.5
+
+
+def test_a_pass_of_a_slow_tilt_is_begun_in_time_from_its_far_end() -> None:
+    slow = SECTION.model_copy(update={"max_rate_deg_s": 0.05})
+    target = tilting(500, 89.9)
+    acu = target.station.acu.model_copy(update={"tilt": slow})
+    assert longest_lead(replace(target, station=target.station.model_copy(update={"acu": acu}))) > 10.0 / 0.05
+    assert longest_lead(target) == longest_lead(overhead_target(500, 89.9))
+
+
+def test_a_tilt_that_never_comes_is_an_alarm_and_nothing_is_acquired_on_a_wrong_path() -> None:
+    def make(parts: Any) -> FakeAcu:
+        acu = FakeAcu(parts)
+        acu.antenna.tilt.trouble = AxisTrouble(is_stuck=True)
+        return acu
+
+    target = tilting(500, 89.9)
+    flight = over_the_zenith(target, before_s=40.0, after_s=-25.0, make_acu=make)
+    seen = flight.snapshots[-1]
+    assert alarms(seen) == [
+        f"tilt not set for this pass: {tilt_of(target).angle_deg:+.1f} deg asked, it is at +0.0 deg"
+    ]
+    assert not any(one.state.startswith("AUTOTRACK") for one in flight.snapshots)
 
 
 def test_an_acu_without_a_tilt_is_refused_and_a_tilt_beyond_its_limits_goes_nowhere() -> None:

@@ -23,7 +23,7 @@ from acu_daemon.errors import UsageError
 HEALTHY_AGE_S = 5.0
 ALARM_KEYS = (  # of a snapshot
     *("clock_alarm", "encoder_problem", "files_alarm", "turn_alarm"),
-    *("limit_alarm", "line_alarm", "stow_alarm"),
+    *("limit_alarm", "line_alarm", "stow_alarm", "tilt_alarm"),
 )
 
 

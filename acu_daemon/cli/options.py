@@ -254,8 +254,9 @@ def not_covered(target: Target, coming: Pass, now_tai_s: float) -> str:
 
 def longest_lead(target: Target) -> float:
     """How long before a rise the antenna sets out at most, s: from the far end of its drives."""
-    acu = target.station.acu
-    return longest_lead_s(acu.azimuth.limits(), acu.elevation.limits(), target.station.tracking.preposition_s)
+    acu, preposition_s = target.station.acu, target.station.tracking.preposition_s
+    tilt = None if acu.tilt is None else acu.tilt.limits()
+    return longest_lead_s(acu.azimuth.limits(), acu.elevation.limits(), preposition_s, tilt)
 
 
 def lacking(target: Target, what: str, from_tai_s: float, to_tai_s: float) -> str:

@@ -193,7 +193,8 @@ class StationDay:
         if running is None:
             return None
         self.keeper.look_in_pass(now_tai_s)
-        way_s = longest_lead_s(acu.azimuth.limits(), acu.elevation.limits(), 0.0)
+        tilt = None if acu.tilt is None else acu.tilt.limits()
+        way_s = longest_lead_s(acu.azimuth.limits(), acu.elevation.limits(), 0.0, tilt)
         entry = self.keeper.interrupter(running, now_tai_s, way_s)
         if entry is None or self.stow_by is not StowBy.NOBODY or self.wind.seen.wants_stow:
             return None

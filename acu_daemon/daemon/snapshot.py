@@ -118,6 +118,7 @@ class Snapshot:
     phantom: str = ""  # what the phantom pass has found of the next pass, or of this one
     paused_until_utc: str = ""  # no pass is begun until then
     tilt: str = ""  # how the pedestal leans, and how it should; where it has a tilt that is moved
+    tilt_alarm: str = ""  # the satellite is up, and the pedestal does not lean as the pass asks: no path is true
     zenith: str = ""  # what crossing it is expected to cost, until it is past
     sun_deg: float | None = None  # between boresight and sun; None where sun_policy is off
     sun_reach_s: float | None = None  # until the sun's keep-out is where the antenna stands; None: not within an hour

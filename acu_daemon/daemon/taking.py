@@ -14,7 +14,7 @@ from acu_daemon.control.tracking.hills import hidden_until_tai_s, is_hidden
 from acu_daemon.control.tracking.off_path import off_path
 from acu_daemon.control.tracking.path_offset import is_heard_beside
 from acu_daemon.control.tracking.scan import covered_text
-from acu_daemon.control.tracking.state_table import AUTOTRACKING, TRACKING, TrackState
+from acu_daemon.control.tracking.state_table import ACTIVE, AUTOTRACKING, TRACKING, TrackState
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.daemon.envelope_watch import look_around
 from acu_daemon.daemon.foreground import Foreground
@@ -91,6 +91,7 @@ def take_snapshot(
         culmination_deg=coming.culmination_el_deg if coming else None,
         zenith=_zenith(area.sky, now_tai_s),
         tilt=_tilt(state, control),
+        tilt_alarm=_tilt_alarm(state, area.sky, now_tai_s, control),
     )
     return replace(seen, verdict=verdict(seen).word)
 
@@ -195,6 +196,16 @@ def _tilt(state: ControlState, control: ControlConfig) -> str:
     if is_tilt_set(status, control):
         return f"{control.tilt_deg:+.1f} deg, set"
     return f"{status.tilt_deg:+.1f} deg, {control.tilt_deg:+.1f} asked: the pass waits for it"
+
+
+def _tilt_alarm(state: ControlState, sky: Sky, now_tai_s: float, control: ControlConfig) -> str:
+    """Of a tilt that is not set in time, or does not stay: before the rise there is time, and it is waited for."""
+    status, track = state.intake.status, state.tracking.track
+    is_up = sky.plan is not None and now_tai_s >= sky.plan.rise_tai_s
+    if not is_up or status is None or track not in ACTIVE - {TrackState.SLAVED} or is_tilt_set(status, control):
+        return ""
+    stands = "the ACU does not read it" if status.tilt_deg is None else f"it is at {status.tilt_deg:+.1f} deg"
+    return f"tilt not set for this pass: {control.tilt_deg:+.1f} deg asked, {stands}"
 
 
 def _arming(state: ControlState, control: ControlConfig) -> str:

@@ -190,6 +190,7 @@ def alarms(seen: Snapshot) -> list[str]:
         seen.envelope_alarm,
         seen.encoder_problem,
         seen.turn_alarm,
+        seen.tilt_alarm,
         seen.limit_alarm,
         seen.clock_alarm,
         seen.line_alarm,

@@ -59,9 +59,10 @@ def lead_s(plan: PassPlan, state: ControlState, config: ControlConfig) -> float:
     return max(config.preposition_s, way_to(plan, state, config).both_s + ACQUIRE_LEAD_S)
 
 
-def longest_lead_s(azimuth: AxisLimits, elevation: AxisLimits, preposition_s: float) -> float:
-    """The same from wherever it may stand."""
-    ways = Way(
-        way_s(azimuth.max_deg - azimuth.min_deg, azimuth), way_s(elevation.max_deg - elevation.min_deg, elevation)
-    )
+def longest_lead_s(
+    azimuth: AxisLimits, elevation: AxisLimits, preposition_s: float, tilt: AxisLimits | None = None
+) -> float:
+    """The same from wherever it, and a tilt that is moved, may stand."""
+    axes = (azimuth, elevation, tilt)
+    ways = Way(*(0.0 if axis is None else way_s(axis.max_deg - axis.min_deg, axis) for axis in axes))
     return max(preposition_s, ways.both_s + ACQUIRE_LEAD_S)
