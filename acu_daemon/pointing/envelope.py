@@ -42,10 +42,6 @@ class Envelope:
         is_avoided = self.sun is not None and self.sun.policy == "avoid"
         object.__setattr__(self, "has_zones", bool(self.keep_outs) or is_avoided)
 
-    @property
-    def may_plunge(self) -> bool:
-        return self.elevation.max_deg > 90.0
-
     def zones_at(self, tai_s: float) -> tuple[Zone, ...]:
         """What the beam keeps out of at an instant."""
         if self.sun is None or self.sun.policy != "avoid":

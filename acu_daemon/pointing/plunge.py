@@ -56,8 +56,7 @@ def way_over(
 ) -> Over | None:
     """The way over the top of a pass; None where the samples do not reach far enough to both sides of it.
 
-    begun: of a way in hand, which is gone on with: its
-    departure and return (s), and azimuth and rate at the departure.
+    begun: of a way in hand, which is gone on with: its departure and return (s), azimuth and rate at the departure.
     """
     if begun is not None:
         return _made(path, half_beam_deg, *begun)
