@@ -65,13 +65,30 @@ def test_the_pedestal_of_rotations_points_where_its_encoders_were_sent(axes, az_
     assert el == pytest.approx(el_deg, abs=1e-9)
 
 
-@given(MOUNTS, AZIMUTHS, st.floats(-3.0, 89.9), st.floats(4e5, 4e6), st.floats(0.7, 1.3))
+@given(MOUNTS, AZIMUTHS, ELEVATIONS, st.floats(4e5, 4e6), st.floats(0.7, 1.3))
 def test_encoders_and_back_is_the_same_direction(mount, az_deg, el_deg, range_m, scale) -> None:
+    """Beyond the zenith it comes back as the sky's: the azimuth half a turn on, the elevation 180 deg less."""
     assume(sum(abs(term) for term in mount.terms_deg()[2:6]) <= MOST_DEG)
     model = AntennaModel(mount, MODEL.refraction, scale)
     az, el = model.geometric_deg(*model.encoders_deg(az_deg, el_deg, range_m), range_m)
-    assert float(az) == pytest.approx(az_deg, abs=INVERSE_DEG)
-    assert float(el) == pytest.approx(el_deg, abs=INVERSE_DEG)
+    is_folded = el_deg > 90.0
+    if abs(el_deg - 90.0) <= INVERSE_DEG:  # either side of the zenith is the same direction there
+        is_folded = float(az) > az_deg + 90.0
+    assert float(az) == pytest.approx(az_deg + 180.0 if is_folded else az_deg, abs=INVERSE_DEG)
+    assert float(el) == pytest.approx(180.0 - el_deg if is_folded else el_deg, abs=INVERSE_DEG)
+
+
+@pytest.mark.parametrize("el_deg", [-3.0, 0.0, 45.0, 89.9, 90.0, 90.1, 135.0, 180.0, 183.0])
+def test_air_counts_from_the_horizon_on_either_side_of_the_zenith(el_deg) -> None:
+    """Refraction is of the true elevation: a plunged antenna at 175 deg looks through the air of 5 deg."""
+    _, el = MODEL.encoders_deg(10.0, el_deg, 1e6)
+    assert float(el) == pytest.approx(float(MODEL.mount.encoders_deg(10.0, _in_air(el_deg))[1]), abs=1e-9)
+
+
+def _in_air(el_deg: float) -> float:
+    if el_deg > 90.0:
+        return 180.0 - _in_air(180.0 - el_deg)
+    return float(MODEL.refraction.apparent_el_deg(el_deg, 1e6, MODEL.refraction_scale))
 
 
 @given(AZIMUTHS, ELEVATIONS, st.floats(4e5, 4e6))

@@ -99,7 +99,6 @@ def test_the_limits_alone_ask_for_no_sky() -> None:
 def test_an_antenna_that_plunges_is_asked_about_the_other_side() -> None:
     plunging = AxisLimits(0.0, 180.0, 5.0, 5.0)
     envelope = Envelope(AZIMUTH, plunging, (MAST,), skyline=skyline_of(((0.0, 30.0), (90.0, 0.0), (270.0, 0.0))))
-    assert envelope.may_plunge
     assert envelope.why_not(180.0, 170.0, NOON) == "within the keep-out of the mast"
     assert envelope.why_not(0.0, 170.0, NOON) == ""
     assert not envelope.sees(180.0, 155.0)

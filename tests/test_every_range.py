@@ -141,6 +141,18 @@ def test_a_number_of_the_configuration_is_taken_up_to_the_ends_of_its_range(
         assert is_taken(tmp_path, key, 1e12)
 
 
+ROTATOR = STATION.replace('url = "tcp://127.0.0.1:3842"', 'url = "tcp://127.0.0.1:4533"\ndialect = "rotctl"')
+
+
+@pytest.mark.parametrize(("dialect", "high"), [("sa3842", 179.99), ("rotctl", 180.0)])
+def test_the_elevation_of_a_rotator_reaches_to_180_deg_and_that_of_registers_to_their_end(tmp_path, dialect, high):
+    text = ROTATOR + '[receiver]\nsignal = "none"\n' if dialect == "rotctl" else STATION
+    key = "acu.elevation.max_deg"
+    assert load_station(write(tmp_path, with_value(text, key, high))).bounds.elevation.max_deg == high
+    with pytest.raises(ConfigError, match=r"elevation\.max_deg"):
+        load_station(write(tmp_path, with_value(text, key, nextafter(high, inf))))
+
+
 @pytest.mark.parametrize("key", ["safety.register_watchdog_s", "safety.following_error_s"])
 def test_nothing_is_off_and_between_nothing_and_enough_is_refused(tmp_path: Path, key: str) -> None:
     assert is_taken(tmp_path, key, 0.0)

@@ -15,6 +15,8 @@ from acu_daemon.orbit.look import look_at
 from acu_daemon.sim.build import make_sky
 from acu_daemon.sim.scenario import AcuChoice, Scenario, SkyErrors
 
+pytestmark = pytest.mark.long
+
 
 def started_before_a_stop(meets_s: float, before_s: float, after_s: float) -> tuple[Flight, float, float]:
     """Begin in mid-pass before_s before the azimuth meets the end of its range, meets_s after culmination.
@@ -92,9 +94,9 @@ def crashing(
 def test_a_daemon_that_crashes_at_any_time_of_a_takeover_is_back_in_autotrack(tmp_path: Path, crash_s: float) -> None:
     states, times, errors = crashing(tmp_path, overhead_target(705, 89.0), crash_s, 21.0)
     assert states[-1] == "AUTOTRACK/FITTED"
-    assert max(error for at_s, error in zip(times, errors, strict=True) if at_s > 20.0) < 0.1
+    assert max(error for at_s, error in zip(times, errors, strict=True) if at_s > 19.0) < 0.1
     lost = [error for at_s, error in zip(times, errors, strict=True) if at_s > -10.0 and error > HALF_BEAM_DEG]
-    assert 0.1 * len(lost) < 17.0
+    assert 0.1 * len(lost) < 16.0
 
 
 @pytest.mark.parametrize("crash_s", [-2.0, 2.5])
@@ -104,4 +106,4 @@ def test_a_daemon_that_crashes_on_the_way_over_the_top_is_back_within_seconds(tm
     assert states[-1] == "AUTOTRACK/FITTED"
     assert max(error for at_s, error in zip(times, errors, strict=True) if at_s > 28.0) < 0.1
     lost = [error for at_s, error in zip(times, errors, strict=True) if at_s > -10.0 and error > HALF_BEAM_DEG]
-    assert 0.1 * len(lost) < 17.0
+    assert 0.1 * len(lost) < 9.0

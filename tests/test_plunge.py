@@ -130,6 +130,7 @@ def test_a_pass_within_half_a_beam_of_the_zenith_is_not_lost_and_is_fitted_on_be
     assert flight.snapshots[-1].rejecting == ""
 
 
+@pytest.mark.long
 def test_a_loss_beyond_the_zenith_is_held_there_though_the_encoders_are_biased() -> None:
     """A zero point of the elevation shows the other way beyond the zenith: twice 0.15 deg were a third of the beam."""
     target = plunging(705, 89.7)
