@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import json
+import os
 import shutil
 import signal
 import socket
@@ -17,6 +18,7 @@ import aiomqtt
 import pytest
 from flights import demo_target
 from script_modules import load
+from structlog.testing import capture_logs
 from test_live_line import SEEN
 
 from acu_daemon.cli.outlets_beside import Outlets, read_password
@@ -27,6 +29,7 @@ from acu_daemon.errors import ConfigError, UsageError
 from acu_daemon.outlets import mqtt_publisher
 from acu_daemon.outlets.mqtt_messages import Topics, discovery
 from acu_daemon.outlets.mqtt_publisher import BrokerAddress, MqttPublisher, MqttSources
+from acu_daemon.sim.virtual import run_virtual
 from acu_daemon.web.recent_events import KEPT, RecentEvents
 
 PATIENCE_S = 90.0
@@ -103,12 +106,19 @@ def test_a_password_that_others_may_read_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "password"
     file.write_text("secret\n")
     file.chmod(0o644)
-    with pytest.raises(UsageError, match="expected a file of mode 0600, it is 0644"):
+    with pytest.raises(UsageError, match="mode 0644, expected a file of 0600"):
         read_password(file)
     file.chmod(0o600)
     assert read_password(file) == "secret"
-    with pytest.raises(UsageError, match="No such file"):
+    for text, reason in ((b"\xff", "UTF-8"), (b"x" * 1025, "at most 1024 bytes")):
+        file.write_bytes(text)
+        with pytest.raises(UsageError, match=reason):
+            read_password(file)
+    with pytest.raises(UsageError, match=r"none: No such file or directory$"):
         read_password(tmp_path / "none")
+    os.mkfifo(tmp_path / "pipe", 0o600)
+    with pytest.raises(UsageError, match="expected a file"):
+        read_password(tmp_path / "pipe")
 
 
 # A broker
@@ -129,8 +139,9 @@ class Broker:
         end_s = time.monotonic() + PATIENCE_S
         while time.monotonic() < end_s:
             with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", self._port), 1.0):
-                break
+                return
             time.sleep(0.05)
+        raise AssertionError("the broker does not listen")
 
     def kill(self) -> None:
         if self._process is not None:
@@ -238,6 +249,66 @@ async def test_a_broker_that_was_gone_for_an_hour_is_told_the_newest_and_nothing
             assert publisher.connect_count > first_count
 
 
+class ScriptedBroker(MqttPublisher):
+    """A publisher whose broker is gone, there for so many seconds, or answers what nobody expected, as it is told."""
+
+    def __init__(self, answers: Callable[[float], float | Exception]) -> None:
+        super().__init__(BrokerAddress("127.0.0.1", 1), TOPICS, Station().sources())
+        self._answers = answers
+        self.tries_s: list[float] = []
+
+    async def _publish_until_gone(self) -> None:
+        now_s = asyncio.get_running_loop().time()
+        self.tries_s.append(now_s)
+        answer = self._answers(now_s)
+        if isinstance(answer, Exception):
+            raise answer
+        await asyncio.sleep(answer)
+        raise aiomqtt.MqttError("gone again")
+
+
+def tried(answers: Callable[[float], float | Exception], seconds: float) -> tuple[list[float], list[str]]:
+    """When a broker is tried, in virtual time and with the pauses of the daemon, and what the log tells of it."""
+
+    async def main() -> list[float]:
+        publisher = ScriptedBroker(answers)
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                await publisher.run()
+        return publisher.tries_s
+
+    with capture_logs() as logs:
+        return run_virtual(main()), [f"{one['event']} {one['reason']}" for one in logs]
+
+
+def test_a_broker_that_is_gone_for_an_hour_is_tried_ever_later_and_told_of_once() -> None:
+    there_s = 120.0
+    tries_s, told = tried(lambda now_s: aiomqtt.MqttError("refused") if now_s < 3600.0 else there_s, 3800.0)
+    assert tries_s == [0.0, 1.0, 3.0, 7.0, 15.0, 31.0, *range(63, 3604, 60), 3603.0 + there_s + 1.0]
+    assert told == ["mqtt.gone refused", "mqtt.gone gone again"]
+
+
+def test_a_broker_that_is_there_for_moments_only_is_not_tried_faster_for_that() -> None:
+    assert tried(lambda _now_s: 2.0, 20.0)[0] == [0.0, 3.0, 7.0, 13.0]
+
+
+def test_an_error_of_our_own_is_told_and_ends_no_publishing() -> None:
+    tries_s, told = tried(lambda _now_s: KeyError("what"), 4.0)
+    assert (tries_s, told) == ([0.0, 1.0, 3.0], ["mqtt.failed KeyError('what')"])
+
+
+def test_of_the_log_of_an_hour_the_newest_lines_are_told_oldest_first_and_once() -> None:
+    station = Station()
+    publisher = MqttPublisher(BrokerAddress("127.0.0.1", 1), TOPICS, station.sources())
+    for number in range(3600):
+        station.events.add({"event": "tick", "number": number, "level": "info"})
+    *events, schedule, state = publisher._news()
+    told = [json.loads(one.payload)["text"] for one in events]
+    assert told == [f"number={number}" for number in range(3600 - KEPT, 3600)]
+    assert (schedule.topic, state.topic) == ("site/dish/schedule", "site/dish/state")
+    assert publisher._news() == []
+
+
 @needs_mosquitto
 @pytest.mark.realtime
 async def test_user_and_password_are_given_and_wrong_ones_are_tried_again_in_peace(tmp_path: Path) -> None:
@@ -247,7 +318,9 @@ async def test_user_and_password_are_given_and_wrong_ones_are_tried_again_in_pea
     more = f"allow_anonymous false\npassword_file {file}\nuser root\n"
     with mosquitto(tmp_path / "broker", port, more):
         async with published(station, port, user="dish", password="wrong") as refused:
-            await asyncio.sleep(0.5)
+            async with asyncio.timeout(PATIENCE_S):
+                while "uthori" not in refused._said:
+                    await asyncio.sleep(0.02)
             assert refused.connect_count == 0
         async with published(station, port, user="dish", password="secret") as publisher:
             async with listening(port, "site/#", username="dish", password="secret") as following:

@@ -4,7 +4,6 @@ import asyncio
 import contextlib
 import ipaddress
 import shutil
-import stat
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +19,7 @@ from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.daemon.tally import Tally
 from acu_daemon.daemon.write_lease import WriteLease
 from acu_daemon.edge.clock import Clock
+from acu_daemon.edge.secret_file import read_secret
 from acu_daemon.errors import UsageError
 from acu_daemon.schedule.wind import WindWatch
 
@@ -203,18 +203,16 @@ class Outlets:
 
 def read_password(path: Path) -> str:
     """The password of a file that nobody else may read.  UsageError: says what to do."""
+    key = "[mqtt] password_file"
     try:
-        mode = stat.S_IMODE(path.stat().st_mode)
-        if not path.is_file() or mode & 0o077:
-            raise UsageError(f"[mqtt] password_file {path}: expected a file of mode 0600, it is {mode:04o}: chmod 600")
-        return path.read_text(encoding="utf-8").strip()
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"[mqtt] password_file {path}: {error}") from None
+        return read_secret(path, key).decode()
+    except UnicodeDecodeError:
+        raise UsageError(f"{key} {path}: expected UTF-8 text") from None
 
 
 def via_of(who: str) -> str:
     """By which way a person's line came."""
-    for via in ("page", "rotctl", "mqtt"):
+    for via in ("page", "rotctl"):
         if f"by {via}" in who or who.startswith(via):
             return via
     return "cli"

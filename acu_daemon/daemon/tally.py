@@ -1,7 +1,7 @@
 """What a daemon has done since its process began, through all its runs: counts and distributions, for other programs.
 
 Adding is all that a tick pays.  Counters only rise; what they are called and in which unit they are shown is the affair
-of whoever shows them (acu_daemon.outlets.metrics).
+of whoever shows them (acu_daemon.outlets.metric_families).
 """
 
 from bisect import bisect_left

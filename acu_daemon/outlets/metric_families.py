@@ -31,7 +31,7 @@ OUTCOMES = tuple(map(str, OVER))
 LINK_ERRORS = ("no_reply", "garbled", "discarded", "late", "doubted")
 REFUSALS = ("not_finite", "permit", "acu")
 ACTIONS = tuple(VERBS)
-VIAS = ("cli", "page", "rotctl", "mqtt")
+VIAS = ("cli", "page", "rotctl")
 AXES = ("azimuth", "elevation")
 
 

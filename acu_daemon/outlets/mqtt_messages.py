@@ -53,13 +53,14 @@ class Topics:
         return MqttMessage(f"{self.base}/schedule", _json(list(passes)), is_retained=True)
 
 
-SENSORS: tuple[tuple[str, str, dict[str, str]], ...] = (  # key of the state, name, what Home Assistant makes of it
+# Key of the state, name, what Home Assistant makes of it.
+SENSORS: tuple[tuple[str, str, dict[str, str | int]], ...] = (
     ("verdict", "Verdict", {"icon": "mdi:satellite-uplink"}),
     ("state", "State", {"icon": "mdi:state-machine"}),
     ("satellite", "Satellite", {"icon": "mdi:satellite-variant"}),
-    ("az_deg", "Azimuth", {"unit_of_measurement": "°", "suggested_display_precision": "2"}),
-    ("el_deg", "Elevation", {"unit_of_measurement": "°", "suggested_display_precision": "2"}),
-    ("off_path_deg", "Off the path", {"unit_of_measurement": "°", "suggested_display_precision": "3"}),
+    ("az_deg", "Azimuth", {"unit_of_measurement": "°", "suggested_display_precision": 2}),
+    ("el_deg", "Elevation", {"unit_of_measurement": "°", "suggested_display_precision": 2}),
+    ("off_path_deg", "Off the path", {"unit_of_measurement": "°", "suggested_display_precision": 3}),
     ("agc_db", "AGC", {"unit_of_measurement": "dB", "device_class": "signal_strength"}),
     ("signal_db", "Signal", {"unit_of_measurement": "dB", "device_class": "signal_strength"}),
     ("inside_s", "Prediction good for", {"unit_of_measurement": "s", "device_class": "duration"}),
@@ -84,12 +85,12 @@ def discovery(topics: Topics, prefix: str) -> Iterator[MqttMessage]:
         yield _entity("sensor", topics, prefix, node, key, {"name": name, "value_template": template, **more}, device)
     for key, name, when, kind in BINARY_SENSORS:
         template = f"{{{{ 'ON' if {when} else 'OFF' }}}}"
-        what = {"name": name, "value_template": template, "device_class": kind}
+        what: dict[str, str | int] = {"name": name, "value_template": template, "device_class": kind}
         yield _entity("binary_sensor", topics, prefix, node, key, what, device)
 
 
 def _entity(
-    kind: str, topics: Topics, prefix: str, node: str, key: str, what: dict[str, str], device: dict[str, Any]
+    kind: str, topics: Topics, prefix: str, node: str, key: str, what: dict[str, str | int], device: dict[str, Any]
 ) -> MqttMessage:
     told: dict[str, Any] = {
         **what,
@@ -100,8 +101,6 @@ def _entity(
         "expire_after": 30,
         "device": device,
     }
-    if "suggested_display_precision" in told:
-        told["suggested_display_precision"] = int(told["suggested_display_precision"])
     return MqttMessage(f"{prefix}/{kind}/{node}/{key}/config", _json(told), is_retained=True)
 
 

@@ -6,7 +6,6 @@ Only the newest state counts, so a broker that was gone for an hour is told that
 import asyncio
 import contextlib
 import ssl
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -67,14 +66,16 @@ class MqttPublisher:
 
     async def run(self) -> None:
         """Publish for ever; a broker that is gone is tried again, ever later, and told of once."""
-        pause_s = self._first_pause_s
+        pause_s, loop = self._first_pause_s, asyncio.get_running_loop()
         while True:
-            begun_s = time.monotonic()
+            begun_s = loop.time()
             try:
                 await self._publish_until_gone()
             except (aiomqtt.MqttError, OSError, ValueError) as error:
                 self._tell(str(error) or type(error).__name__)
-            if time.monotonic() - begun_s > self._longest_pause_s:
+            except Exception as error:  # noqa: BLE001  the top of its own task
+                self._tell_failed(repr(error))
+            if loop.time() - begun_s > self._longest_pause_s:
                 pause_s = self._first_pause_s
             await asyncio.sleep(pause_s)
             pause_s = min(2.0 * pause_s, self._longest_pause_s)
@@ -84,6 +85,11 @@ class MqttPublisher:
             self._said = reason
             broker = f"{self._broker.host}:{self._broker.port}"
             self._log.warning("mqtt.gone", broker=broker, reason=reason)
+
+    def _tell_failed(self, reason: str) -> None:
+        if reason != self._said:
+            self._said = reason
+            self._log.error("mqtt.failed", reason=reason, advice="an error of ours: please report it")
 
     async def _publish_until_gone(self) -> None:
         broker, topics = self._broker, self._topics

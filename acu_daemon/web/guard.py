@@ -11,17 +11,15 @@ import hashlib
 import hmac
 import ipaddress
 import json
-import os
-import stat
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+from acu_daemon.edge.secret_file import read_secret
 from acu_daemon.errors import UsageError
 
 LEAST_TOKEN = 16  # characters
-MOST_TOKEN_BYTES = 1024
 LOCAL = "localhost"
 
 
@@ -56,22 +54,7 @@ def is_our_origin(origin: str, host: str) -> bool:
 
 def read_token(path: Path) -> bytes:
     """The token of a file that nobody else may read.  UsageError: says what to do."""
-    try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-    except OSError as error:
-        make = f"make one: (umask 077; openssl rand -hex 16 > {path})"
-        raise UsageError(f"[web] token_file {path}: {error.strerror}; {make}") from None
-    try:
-        found = os.fstat(descriptor)
-        mode = stat.S_IMODE(found.st_mode)
-        if not stat.S_ISREG(found.st_mode) or mode & 0o077:
-            raise UsageError(
-                f"[web] token_file {path}: mode {mode:04o}, expected a file of 0600 that nobody else reads; "
-                f"chmod 600 {path}"
-            )
-        token = os.read(descriptor, MOST_TOKEN_BYTES).strip()
-    finally:
-        os.close(descriptor)
+    token = read_secret(path, "[web] token_file", f"(umask 077; openssl rand -hex 16 > {path})")
     if len(token) < LEAST_TOKEN:
         raise UsageError(f"[web] token_file {path}: expected at least {LEAST_TOKEN} characters")
     return token
