@@ -13,7 +13,6 @@ from math import isfinite
 LONGEST_LINE_BYTES = 200
 OK, INVALID, NOT_IMPLEMENTED, IO_ERROR, REJECTED = 0, -1, -4, -6, -9
 NUMBER = re.compile(rb"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
-EASYCOMM = re.compile(rb"(AZ|EL)([-+.0-9eE]*)", re.IGNORECASE)
 
 
 class RotctlVerb(Enum):
@@ -74,9 +73,9 @@ _LONG["dump_state"] = (RotctlVerb.DUMP_STATE, "dump_state", 0)
 def understood_line(line: bytes) -> Command:
     """Read a line without its end.  WRONG: it is none, or its values are no numbers."""
     text = line.strip(b" \t\r\x00")
-    if not text:
+    if not text.split():
         return Command(RotctlVerb.NOTHING)
-    if text[:2].upper() in (b"AZ", b"EL", b"SA", b"SE") and not text.startswith(b"S "):
+    if text[:2].upper() in (b"AZ", b"EL") or text.split()[0].upper() in (b"SA", b"SE"):
         return _easycomm(text)
     mark = ""
     if text[:1] in (b"+", b";", b"|", b",") and len(text) > 1:
@@ -88,8 +87,10 @@ def understood_line(line: bytes) -> Command:
     if head.startswith(b"\\"):
         found = _LONG.get(head[1:].decode("ascii", "replace"))
     else:
-        found = _COMMANDS.get(head[:1].decode("ascii", "replace"))
-        rest = [head[1:], *rest] if len(head) > 1 else rest  # `P180 45`
+        found, glued = _COMMANDS.get(head[:1].decode("ascii", "replace")), head[1:]
+        if glued:  # `P180 45`; but a word, such as a browser's `Sec-Fetch-Mode:`, is no stop
+            rest = [glued, *rest]
+            found = found if found is not None and found[2] and NUMBER.match(glued) else None
     if found is None:
         return Command(RotctlVerb.WRONG, mark=mark)
     verb, name, count = found
@@ -114,7 +115,8 @@ def _easycomm(text: bytes) -> Command:
     """EasyComm II: `AZ180.0 EL45.0` points, `AZ EL` asks, `SA SE` stops; what else stands in the line is for radios."""
     if text[:1].upper() == b"S":
         return Command(RotctlVerb.EASYCOMM_STOP)
-    found = {name.upper(): value for name, value in EASYCOMM.findall(text)}
+    words = [(word[:2].upper(), word[2:]) for word in text.split()]
+    found = {name: value for name, value in words if name in (b"AZ", b"EL")}
     if all(value == b"" for value in found.values()):
         return Command(RotctlVerb.EASYCOMM_GET)
     values = [_number(found.get(name, b"")) for name in (b"AZ", b"EL")]

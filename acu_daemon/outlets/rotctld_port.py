@@ -231,11 +231,11 @@ class _Client(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         self.heard_s = self._port.now_s
         *lines, self._rest = (self._rest + data).split(b"\n")
-        if len(self._rest) > LONGEST_LINE_BYTES or len(lines) > MOST_LINES:
-            self.drop()
+        if max(map(len, (*lines, self._rest))) > LONGEST_LINE_BYTES or len(lines) > MOST_LINES:
+            self.drop()  # a line that is cut would be another command
             return
         for line in lines:
-            answer = self._port.answer(line[:LONGEST_LINE_BYTES], self._peer)
+            answer = self._port.answer(line, self._peer)
             if answer is None:
                 self.drop()
                 return
