@@ -10,6 +10,7 @@ import statistics
 import sys
 import tempfile
 import time
+from math import isinf
 from pathlib import Path
 from typing import Any
 
@@ -27,13 +28,13 @@ def buckets(page: str) -> dict[float, float]:
 
 
 def p99_ms(before: dict[float, float], after: dict[float, float]) -> float:
-    """As Prometheus reckons it: linear within a bucket."""
+    """As Prometheus reckons it: linear within a bucket, and in the one without an end its beginning."""
     counts = {bound: after[bound] - before[bound] for bound in after}
     rank, low_s, low_count = 0.99 * max(counts.values()), 0.0, 0.0
     for bound_s, count in sorted(counts.items()):
         if count >= rank:
             share = (rank - low_count) / max(count - low_count, 1e-9)
-            return 1e3 * (low_s + share * (min(bound_s, 2 * low_s + 1e-3) - low_s))
+            return 1e3 * (low_s if isinf(bound_s) else low_s + share * (bound_s - low_s))
         low_s, low_count = bound_s, count
     return 0.0
 

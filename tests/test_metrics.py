@@ -235,13 +235,29 @@ def test_every_alert_is_tried() -> None:
     assert set(re.findall(r"alertname: (\w+)", tried)) == set(named)
 
 
-def test_every_metric_of_rules_and_dashboard_is_one_of_the_page() -> None:
-    there = {re.split(r"[{ ]", series)[0] for series in values(render(full_tally(), AROUND, NOW))}
+def test_an_alert_is_tried_for_its_silence_too() -> None:
+    tried = (MONITORING / "alerts_test.yml").read_text()
+    silent = re.findall(r"alertname: (\w+)(?:,|\n *) *exp_alerts: \[\]", tried)
+    assert set(silent) == set(re.findall(r"alertname: (\w+)", tried))
+
+
+def test_every_metric_of_rules_and_dashboard_is_one_of_the_page_and_every_one_is_in_the_documentation() -> None:
+    page = render(full_tally(), AROUND, NOW)
+    there = {re.split(r"[{ ]", series)[0] for series in values(page)}
     asked = (MONITORING / "alerts.yml").read_text() + (MONITORING / "grafana-dashboard.json").read_text()
-    assert set(re.findall(r"\bacu_\w+(?=\{|\[|\)| )", asked)) - set(TrackedLabels) - there == set()
+    assert set(re.findall(r"\bacu_\w+", asked)) - there == set()
+    told = set(re.findall(r"`(acu_\w+)", (MONITORING.parent / "docs" / "metrics.md").read_text()))
+    assert set(re.findall(r"^# TYPE (\w+)", page.decode(), re.MULTILINE)) == told
 
 
-TrackedLabels = ("acu_control_state", "acu_pass_phase", "acu_run_mode")
+def test_every_label_that_a_rule_asks_for_is_one_that_can_be() -> None:
+    series = list(values(render(full_tally(), AROUND, NOW)))
+    asked = re.findall(r'(acu_\w+)\{(\w+)(=~|!~|=)"([^"]+)"\}', (MONITORING / "alerts.yml").read_text())
+    assert len(asked) > 15
+    for name, label, _, text in asked:
+        found = [match for one in series if (match := re.fullmatch(rf'{name}\{{.*\b{label}="([^"]*)".*\}}', one))]
+        for wanted in text.split("|"):
+            assert any(re.fullmatch(wanted, match.group(1)) for match in found), (name, label, wanted)
 
 
 # Served
