@@ -10,16 +10,12 @@ from typing import Any
 from acu_daemon.acu.driver import AcuDriver
 from acu_daemon.cli.options import Target, coming_pass
 from acu_daemon.cli.run_setup import make_job
-from acu_daemon.cli.tape_head import head_of
-from acu_daemon.cli.virtual_pass import events_to
+from acu_daemon.cli.virtual_pass import events_to, taped
 from acu_daemon.daemon.service import Outcome, Service, SignalSource
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.edge.arrivals import Arrivals
 from acu_daemon.edge.clock import Clock, LoopClock
 from acu_daemon.edge.fit import InlineFitRunner
-from acu_daemon.edge.tape import no_note
-from acu_daemon.edge.tape_file import TapeFile
-from acu_daemon.edge.writer import Writer
 from acu_daemon.errors import LinkError, LinkRefusedError
 from acu_daemon.model import Reading
 from acu_daemon.sim.virtual import run_virtual
@@ -216,24 +212,20 @@ def fly_rotator(
             flight.snapshots.append(seen)
             flight.to_fit_count += len(service._area.to_fit)
 
-        files = Writer("tape", math.inf)
-        kept = None if tape is None else TapeFile(tape, head_of(target, job, link, begin_tai_s), files)
-        service = Service(
-            job,
-            link,
-            clock,
-            InlineFitRunner(job.refit),
-            note=no_note if kept is None else kept.note,
-            on_snapshot=look,
-            on_reading=flight.readings.append,
-            signal=signal,
-        )
-        for at_s, action in script:
-            asyncio.get_running_loop().call_later(at_s, action, link, habits, service)
-        flight.outcome = await service.run()
-        if kept is not None:
-            kept.close()
-        files.close()
+        with taped(tape, target, job, link, begin_tai_s) as note:
+            service = Service(
+                job,
+                link,
+                clock,
+                InlineFitRunner(job.refit),
+                note=note,
+                on_snapshot=look,
+                on_reading=flight.readings.append,
+                signal=signal,
+            )
+            for at_s, action in script:
+                asyncio.get_running_loop().call_later(at_s, action, link, habits, service)
+            flight.outcome = await service.run()
 
     with events_to(flight.events):
         run_virtual(main())

@@ -33,6 +33,8 @@ def test_a_wind_is_read_as_it_is_written():
         (text(gust_m_s=True), "expected a number"),
         (b'{"mean_m_s": NaN, "gust_m_s": 3, "utc": "2026-08-18T12:00:00Z"}', "no such wind"),
         (text(mean_m_s=400.0), "no such wind"),
+        (text(gust_m_s=10**400), "too large"),
+        (b"[" * 100_000, "recursion"),
         (text(utc="soon"), "soon"),
         (text(utc="2026-08-18T13:00:00Z"), "ahead of this clock"),
     ],

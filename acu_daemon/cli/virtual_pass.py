@@ -4,7 +4,7 @@ import asyncio
 import logging
 import math
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -18,14 +18,14 @@ from acu_daemon.cli.options import Target, coming_pass
 from acu_daemon.cli.run_setup import make_job
 from acu_daemon.cli.simulated import station_air, tilt_of
 from acu_daemon.cli.tape_head import head_of
-from acu_daemon.daemon.service import Outcome, Service, SignalSource
+from acu_daemon.daemon.service import Outcome, PassJob, Service, SignalSource
 from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.daemon.tally import Tally
 from acu_daemon.drivers.sa3842.codec import CommandDecoder, address_byte
 from acu_daemon.drivers.sa3842.messages import Command
 from acu_daemon.edge.clock import LoopClock
 from acu_daemon.edge.fit import FitRunner, InlineFitRunner
-from acu_daemon.edge.tape import no_note
+from acu_daemon.edge.tape import Note, no_note
 from acu_daemon.edge.tape_file import TapeFile
 from acu_daemon.edge.writer import Writer
 from acu_daemon.model import Reading
@@ -153,32 +153,39 @@ def fly(
         coming = coming_pass(target, begin_tai_s)
         job = make_job(target, coming, link, is_rehearsal=True, end_tai_s=end_tai_s, memory=memory)
         job = replace(job, control=replace(job.control, is_shadow=is_shadow, is_resting=is_resting))
-        files = Writer("tape", math.inf)
-        kept = None if tape is None else TapeFile(tape, head_of(target, job, link, begin_tai_s), files)
-        service = Service(
-            job,
-            link,
-            clock,
-            make_runner(job.refit),
-            note=no_note if kept is None else kept.note,
-            on_snapshot=flight.snapshots.append,
-            on_estimate=flight.estimates.append,
-            on_reading=flight.readings.append,
-            signal=signal,
-            tally=tally,
-        )
-        loop = asyncio.get_running_loop()
-        for tai_s, action in script:
-            loop.call_later(tai_s - begin_tai_s, action, ScriptAccess(acu, link, clock, service, board))
-        flight.outcome = await service.run()
-        if kept is not None:
-            kept.close()
-        files.close()
+        with taped(tape, target, job, link, begin_tai_s) as note:
+            service = Service(
+                job,
+                link,
+                clock,
+                make_runner(job.refit),
+                note=note,
+                on_snapshot=flight.snapshots.append,
+                on_estimate=flight.estimates.append,
+                on_reading=flight.readings.append,
+                signal=signal,
+                tally=tally,
+            )
+            loop = asyncio.get_running_loop()
+            for tai_s, action in script:
+                loop.call_later(tai_s - begin_tai_s, action, ScriptAccess(acu, link, clock, service, board))
+            flight.outcome = await service.run()
         acu.advance(clock.tai_s())
 
     with events_to(flight.events):
         run_virtual(main())
     return flight
+
+
+@contextmanager
+def taped(tape: Path | None, target: Target, job: PassJob, link: Any, begin_tai_s: float) -> Iterator[Note]:
+    """What keeps a pass in a file; tape None: in none."""
+    if tape is None:
+        yield no_note
+        return
+    head = head_of(target, job, link, begin_tai_s)
+    with closing(Writer("tape", math.inf)) as files, closing(TapeFile(tape, head, files)) as kept:
+        yield kept.note
 
 
 @contextmanager

@@ -52,7 +52,7 @@ class SerialLink:
         bytesize, parity = CHARACTER_FORMATS["8N1" if _is_pseudo_terminal(self._path) else self._format]
         port = serial.Serial(self._path, self._baud, bytesize, parity, timeout=0, write_timeout=0, exclusive=True)
         try:
-            with contextlib.suppress(OSError, ValueError, NotImplementedError):
+            with contextlib.suppress(ValueError):  # of pyserial: the driver has no such mode, as of a pseudo terminal
                 port.set_low_latency_mode(True)  # an FTDI adapter otherwise adds 16 ms to every reply
             os.set_blocking(port.fileno(), False)
             fcntl.ioctl(port.fileno(), termios.TIOCEXCL)

@@ -26,7 +26,7 @@ def wind_of(text: bytes, now_tai_s: float) -> WindSample:
         if not isinstance(said, dict):
             raise ValueError("expected a JSON object")
         sample = WindSample(_number(said, "mean_m_s"), _number(said, "gust_m_s"), tai_from_utc(said["utc"]))
-    except (KeyError, TypeError, AttributeError, ValueError, RecursionError) as error:
+    except (KeyError, TypeError, AttributeError, ValueError, RecursionError, OverflowError) as error:
         raise ValueError(reason_of(error)) from None
     if not sample.is_possible:
         raise ValueError(f"mean_m_s = {sample.mean_m_s:g}, gust_m_s = {sample.gust_m_s:g}: no such wind")
