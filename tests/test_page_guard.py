@@ -98,6 +98,7 @@ def test_a_wrong_seal_and_what_is_no_text_are_refused() -> None:
     assert seals.open(*sealed({"n": 1}, token=b"another token 16")) == (None, "the token is wrong")
     assert seals.open(None, None)[0] is None
     assert seals.open("{}", "\udc80\u00e9")[0] is None
+    assert seals.open('{"n":1,"x":"\ud800"}', "0") == (None, "the token is wrong")
     assert seals.open("no json", seal_of(TOKEN, "n", "no json")) == (None, "the order is no JSON")
     assert "only looks" in Seals(None, "n").open(*sealed({"n": 1}))[1]
 

@@ -101,6 +101,8 @@ NUDGE = {"verb": "nudge", "values": {"along_s": 0.5, "across_deg": -0.1, "keep":
         ({"verb": "skip", "values": {"satellite": "a b"}}, None),
         ({"verb": "skip", "values": {"satellite": "x keep=yes"}}, None),
         ({"verb": "skip", "values": {"sat ellite": "x"}}, None),
+        ({"verb": "nudge", "values": {"along_s": 10**400}}, None),
+        ({"verb": "grant", "values": {"lasts_s": 3600}}, "grant lasts_s=3600"),
         ({"verb": 1}, None),
         ({"verb": "arm", "values": []}, None),
         ({"verb": "arm", "values": {f"k{n}": 1 for n in range(9)}}, None),
@@ -127,7 +129,7 @@ def test_every_state_has_a_colour_in_the_timeline() -> None:
 @pytest.mark.parametrize(
     ("seen", "said"),
     [
-        (replace(SEEN, state="IDLE", arming="disarmed", disarmed_by="a person"), ["disarmed by a person"]),
+        (replace(SEEN, state="IDLE", arming="disarmed", disarmed_by="a person"), ["DISARMED by a person"]),
         (replace(SEEN, arming="disarmed", disarmed_by="a person"), ["DISARMED by a person"]),
         (replace(SEEN, encoder_problem="frozen"), ["frozen"]),
         (replace(SEEN, is_link_up=False, link_problem="refused"), ["refused"]),

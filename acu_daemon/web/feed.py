@@ -180,10 +180,10 @@ class Feed:
 
 
 def alarms_shown(seen: Snapshot) -> list[str]:
-    """The alarms; who has disarmed it is no sentence by itself, and at the start nothing is known for a moment."""
+    """The alarms; who has disarmed it is said alike in every state, and at the start nothing is known yet."""
     if seen.az_deg is None and seen.tick_count < FIRST_TICKS:
         return []
-    return [f"disarmed by {text}" if text == seen.disarmed_by else text for text in alarms(seen)]
+    return [f"DISARMED by {text}" if text == seen.disarmed_by else text for text in alarms(seen)]
 
 
 def to_json(value: Any) -> str:

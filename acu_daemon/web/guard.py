@@ -62,7 +62,7 @@ def read_token(path: Path) -> bytes:
 
 def seal_of(token: bytes, nonce: str, order: str) -> str:
     """What an order is sealed with."""
-    return hmac.new(token, f"{nonce}\n{order}".encode(), hashlib.sha256).hexdigest()
+    return hmac.new(token, f"{nonce}\n{order}".encode("utf-8", "surrogatepass"), hashlib.sha256).hexdigest()
 
 
 @dataclass(slots=True)

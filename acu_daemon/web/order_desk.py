@@ -150,7 +150,7 @@ def line_of(said: dict[str, Any]) -> str | None:
 def _text(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return f"{value:.6g}" if isinstance(value, int | float) else str(value)
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _yes(text: str) -> dict[str, Any]:

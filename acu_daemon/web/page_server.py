@@ -158,9 +158,9 @@ class PageServer:
         person = Person(str(request.remote), Seals(self._token, secrets.token_hex(16)))
         live = LiveSide(socket, person, self._feed, self._clock.monotonic_s)
         self._lives.add(live)
-        self._feed.is_watched = True
-        self._feed.refresh()
         try:
+            self._feed.is_watched = True
+            self._feed.refresh()
             async with asyncio.TaskGroup() as both:
                 sending = both.create_task(live.send())
                 await self._hear(socket, live)

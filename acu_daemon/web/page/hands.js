@@ -1,5 +1,5 @@
 "use strict";
-// Stop, and the orders.  STOP goes out at a pointer's or a key's press, by the live line and beside it, never later.
+// Stop, and the orders.  STOP goes out at a pointer's or a key's press, by the live line or, without one, by a request.
 let mayOrder = false, nonce = "", token = "", orderNumber = 0, replyNumber = 0, unlockedUntil = 0;
 const waiting = new Map();
 const WAIT_MS = 2000;
@@ -49,9 +49,10 @@ function watchStop(now) {
   if (isNew) text += ` \u2014 on the wire ${now.stop_sent_utc.slice(11, 23)}`;
   if (isNew && now.stop_confirmed_utc) {
     text += ` \u2014 the ACU confirms ${now.stop_confirmed_utc.slice(11, 23)}`;
-    const stands = now.speed_deg_s !== null && now.speed_deg_s < 0.2;
+    const isKnown = now.is_link_up && now.speed_deg_s !== null, stands = isKnown && now.speed_deg_s < 0.2;
     if (stands) stopped.stood ||= performance.now();
-    text += stands ? ` \u2014 the antenna stands${after(stopped.stood - stopped.at)}; disarmed until somebody arms it` : " \u2014 it still moves";
+    if (stands) text += ` \u2014 the antenna stands${after(stopped.stood - stopped.at)}; disarmed until somebody arms it`;
+    else text += isKnown ? " \u2014 it still moves" : " \u2014 whether it still moves is not known";
   } else text += now.is_stopping || isNew ? " \u2014 the ACU has not confirmed yet" : "";
   sayStop(text);
 }

@@ -110,7 +110,7 @@ function watch() { // ten times a second, whatever comes or does not
   if (now) {
     const passed = (performance.now() - nowAt) / 1000, age = now.reading_age_s === null ? null : now.reading_age_s + passed, isOld = isMeasurementOld(now, passed);
     if (isLost) link("link-acu", "", "not known");
-    else link("link-acu", now.is_link_up ? "good" : "bad", now.is_link_up ? "answers" : now.link_problem || "no link");
+    else link("link-acu", now.is_link_up ? "good" : "bad", now.is_link_up ? "answers" : "no link");
     const trouble = now.latch ? "latched" : now.acu_faults ? "fault" : now.encoder_problem ? "encoder" : "";
     if (isLost) link("link-antenna", "", "not known");
     else link("link-antenna", trouble || !now.is_link_up ? "bad" : isOld ? "watch" : "good", trouble || (age === null ? "never read" : `read ${age.toFixed(1)} s ago`));
