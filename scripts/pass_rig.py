@@ -192,12 +192,28 @@ class Rig:
         station = self.config / "station.toml"
         station.write_text(station.read_text().replace("tcp://127.0.0.1:3842", self.url))
 
+    def add_page(self, token: bytes) -> None:
+        """Let the daemon serve the operator's page on a free port, and take orders of who has the token."""
+        path, station = self.config / "token", self.config / "station.toml"
+        path.touch(mode=0o600)
+        path.write_bytes(token)
+        station.write_text(station.read_text() + '\n[web]\nlisten = "127.0.0.1:0"\ntoken_file = "token"\n')
+
     def start_daemon(self, *more: str) -> None:
         """Start the daemon, as far ahead of others as its unit puts it where that is permitted.
 
         Its log goes to `log`, its complaints to `errors`.
         """
-        arguments = [*self.arguments("run"), "--state", str(self.directory / "state"), *more]
+        self._start_daemon([*self.arguments("run"), *more])
+
+    def start_station(self, *more: str) -> None:
+        """Start the daemon as a station's, which chooses its passes itself."""
+        arguments = self.arguments("run")
+        at = arguments.index("--satellite")
+        self._start_daemon([*arguments[:at], *arguments[at + 2 :], *more])
+
+    def _start_daemon(self, arguments: list[str]) -> None:
+        arguments += ["--state", str(self.directory / "state")]
         with self.log.open("w") as log, self.errors.open("w") as errors:
             self.daemon = subprocess.Popen(arguments, stdout=log, stderr=errors, text=True, start_new_session=True)
         self.is_ahead = try_nice(self.daemon.pid, DAEMON_NICENESS)

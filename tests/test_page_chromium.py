@@ -30,6 +30,7 @@ pytestmark = [
 ]
 NewTab = Callable[[], Awaitable[Tab]]
 SHOWN = "window.acuShown?.tick"
+COLOUR = "getComputedStyle(document.querySelector('%s')).color"
 
 
 class Shown:
@@ -115,10 +116,6 @@ async def unlock(tab: Tab, name: str = "Ann") -> None:
     await tab.until("!document.querySelector('#verbs').hidden")
 
 
-def button(verb: str) -> str:
-    return f"[...document.querySelectorAll('#verbs button')].find((one) => one.textContent === '{verb}')"
-
-
 async def test_it_says_what_is_asks_nothing_outside_and_complains_of_nothing(new_tab: NewTab, shown: Shown) -> None:
     shown.change(is_rehearsal=True, is_simulation=True)
     tab = await opened(new_tab, shown)
@@ -144,6 +141,8 @@ async def test_a_press_of_stop_goes_out_at_once_and_a_page_that_is_loaded_again_
     said = await tab.text("#stop-said")
     assert "on the wire 00:00:01.250" in said
     assert "the ACU confirms 00:00:01.270" in said
+    shown.change(is_link_up=False, speed_deg_s=None, state="LINK-LOST")
+    await tab.until("document.querySelector('#stop-said').textContent.includes('whether it still moves is not known')")
     await tab.value("document.querySelector('#stop').click()")  # no hand: no stop
     await tab.call("Page.reload")
     await tab.until(SHOWN)
@@ -210,9 +209,13 @@ async def test_an_alarm_is_seen_by_somebody_and_stands(new_tab: NewTab, shown: S
 async def test_a_connection_that_is_lost_is_said_and_all_is_grey_until_it_is_back(
     new_tab: NewTab, shown: Shown
 ) -> None:
+    shown.change(encoder_problem="the azimuth encoder is frozen")
     tab = await opened(new_tab, shown)
+    await tab.until("document.querySelector('#alarm-list .on')")
     await shown.stop()
     await tab.until("document.body.classList.contains('old')")
+    for part in ("#word", "#az-m", "#facts dd", "#alarm-list .on", ".strip b"):
+        assert await tab.value(COLOUR % part) == await tab.value(COLOUR % "#station"), part
     assert "CONNECTION LOST" in await tab.text("#lost")
     assert await tab.value("document.querySelector('#link-daemon').className") == "bad"
     await tab.press("#stop")
@@ -271,6 +274,11 @@ async def test_it_fits_and_stop_is_in_sight_and_large(new_tab: NewTab, shown: Sh
     assert bottom - top >= 48
     assert right - left >= 48
     assert width - 20 <= right <= width
+    height_before = await tab.value("document.querySelector('#links').offsetHeight")
+    shown.change(is_link_up=False, state="LINK-LOST", link_problem="tcp://127.0.0.1:3842 is open, but no ACU answers")
+    await tab.until("document.querySelector('#link-acu').className === 'bad'")
+    assert await tab.value("document.documentElement.scrollWidth") <= width
+    assert await tab.value("document.querySelector('#links').offsetHeight") == height_before
 
 
 @pytest.mark.skipif(not AXE.exists(), reason="no axe-core here (npm install --prefix build/axe axe-core@4.14.1)")
@@ -324,3 +332,52 @@ async def test_a_real_daemon_is_stopped_from_the_page_frozen_and_killed_under_it
         await tab.until("document.body.classList.contains('old')")
         assert "CONNECTION LOST" in await tab.text("#lost")
         assert tab.said == [] or all("WebSocket" in one for one in tab.said)
+
+
+OBEYED = (  # what is pressed, what is filled in before, and what is so after it
+    ("hold", {}, "now.is_held_by_person && now.state === 'PROGRAM' && now.acu_mode !== 'AUTOTRACK'"),
+    ("nudge", {"along_s": "0.5", "across_deg": "-0.1"}, "now.nudge_along_s === 0.5 && now.nudge_across_deg === -0.1"),
+    ("track", {}, "!now.is_held_by_person && now.state.startsWith('AUTOTRACK') && now.acu_mode === 'AUTOTRACK'"),
+    ("stow", {}, "now.stow_by === 'operator' && now.acu_mode.startsWith('STOW')"),
+    ("unstow", {}, "!now.stow_by && now.state.startsWith('AUTOTRACK')"),
+    ("skip", {}, "state.schedule[0].state === 'cancelled'"),
+    ("pause", {"until": "2026-08-20T06:00:00Z"}, "now.paused_until_utc === '2026-08-20T06:00:00Z'"),
+)
+
+
+async def give(tab: Tab, button: str, comes_true: str) -> None:
+    """Press an order's button, on a page that is unlocked again where the last order is long ago."""
+    if await tab.value("document.querySelector('#verbs').hidden"):
+        await unlock(tab)
+    await tab.value("document.querySelector('#order-said').textContent = ''")
+    await tab.press(button)
+    await tab.until("document.querySelector('#order-said').textContent")
+    assert "\u2713" in await tab.text("#order-said")
+    await tab.until(comes_true)
+
+
+async def test_a_real_station_obeys_each_verb_that_is_pressed(new_tab: NewTab, tmp_path: Path) -> None:
+    scene = pass_rig.make_scene(tmp_path / "scene", None, 300.0)
+    with pass_rig.rigs(scene, ["tcp"], tmp_path) as (rig,):
+        rig.start_acu()
+        rig.add_page(TOKEN)
+        rig.start_station()
+        await until(lambda: rig.log.exists() and rig.events("page.open"))
+        tab = await new_tab()
+        await tab.size(1366, 900)
+        await tab.open(rig.events("page.open")[0]["url"])
+        await tab.until(SHOWN)
+        await tab.until("now.state.startsWith('AUTOTRACK')")
+        await unlock(tab)
+        is_given_up = "state.schedule.some((one) => one.reason.startsWith('excluded'))"
+        await give(tab, "#passes button[aria-label^='skip ']", is_given_up)
+        await give(tab, "#passes button[aria-label^='unskip ']", f"!{is_given_up}")
+        for verb, values, comes_true in OBEYED:
+            for name, text in values.items():
+                await tab.press(f"#verbs .verb:has(#what-{verb}) [name={name}]")
+                await tab.write(text)
+            await give(tab, f"#verbs button[aria-describedby=what-{verb}]", comes_true)
+        asked = rig.events("operator.asked")
+        assert [one["line"].split()[0] for one in asked] == ["skip", "unskip", *(verb for verb, _, _ in OBEYED)]
+        assert {one["who"] for one in asked} == {"Ann by page from 127.0.0.1"}
+        assert tab.said == []
