@@ -93,6 +93,7 @@ OUT_OF_SAID: dict[str, tuple[type[Section], dict[str, Any]]] = {  # ranges that 
     "MaintenanceSection.from_utc": (MaintenanceSection, {"from_utc": "noon", "to_utc": "2026-01-01T00:00:00Z"}),
     "MaintenanceSection.to_utc": (MaintenanceSection, {"from_utc": "2026-01-01T00:00:00Z", "to_utc": "2026-01-01"}),
     **{f"HooksSection.{hook}": (HooksSection, {str(hook): "a text"}) for hook in Hook},
+    "HooksSection.user": (HooksSection, {"user": ""}),
     "WindSection.udp": (WindSection, {"udp": "4841"}),
     "WebSection.listen": (WebSection, {"listen": "localhost:8642"}),
     "RotctldSection.listen": (RotctldSection, {"listen": "localhost:4533"}),

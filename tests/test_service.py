@@ -14,6 +14,7 @@ from script_modules import load
 from supervisor import UNIT, Supervisor, read_unit
 
 from acu_daemon.cli.safe_stop import why_not
+from acu_daemon.edge import hook_rights
 from acu_daemon.report.pass_trace import read_trace
 
 pass_rig = load("pass_rig")
@@ -102,6 +103,7 @@ def test_the_unit_restarts_for_ever_but_not_after_a_refused_configuration() -> N
 
 
 STATION = UNIT.parent / "acu-daemon@station.service.d" / "station.conf"
+AS_USER = UNIT.parent / "drop-ins" / "hooks-user.conf"
 DROP_INS = sorted((UNIT.parent / "drop-ins").glob("*.conf"))
 
 
@@ -120,7 +122,16 @@ def test_a_drop_in_is_well_formed_and_loosens_only_what_it_says(unit: Path, drop
     assert (done.returncode, done.stderr) == (0, "")
     allowed = {"ReadWritePaths", "DeviceAllow", "RestrictAddressFamilies", "IPAddressAllow"}
     told = {"Description", "ExecStart", "ExecReload"}
-    assert set(read_unit(drop_in)) <= (told if drop_in == STATION else allowed)
+    switches = {"CapabilityBoundingSet", "AmbientCapabilities", "SystemCallFilter"}
+    loosened = {STATION: told, AS_USER: switches}.get(drop_in, allowed)
+    assert set(read_unit(drop_in)) <= loosened
+
+
+def test_hooks_of_another_user_cost_the_rights_to_become_one_and_to_end_it_and_no_other() -> None:
+    directives = read_unit(AS_USER)
+    needed = [" ".join(hook_rights.NEEDED)]
+    assert (directives["CapabilityBoundingSet"], directives["AmbientCapabilities"]) == (needed, needed)
+    assert directives["SystemCallFilter"] == ["@setuid capset"]
 
 
 # when the antenna is stopped from outside

@@ -10,6 +10,7 @@ import typer
 
 from acu_daemon.cli.check_acu import acu_findings
 from acu_daemon.cli.check_finding import GO, NO_GO, WARN, Finding
+from acu_daemon.cli.check_hooks import hooks_finding
 from acu_daemon.cli.check_running import held_finding, left_behind, running_finding
 from acu_daemon.cli.check_satellite import satellite_findings
 from acu_daemon.cli.options import (
@@ -95,6 +96,8 @@ def findings(config: Path, satellite: str | None, now_tai_s: float, state: Path 
     yield from _air(config, station, now_tai_s)
     if bounds := station.envelope.told():
         yield Finding(GO, "envelope", bounds)
+    if (hooks := hooks_finding(station.hooks)) is not None:
+        yield hooks
     yield from sources_findings(config, station.elements, now_tai_s)
     directory, antenna = state_path(state, is_rehearsal=False), antenna_of(station)
     folders = (antenna.folder(directory), *older_folders(directory, antenna))

@@ -16,6 +16,7 @@ import structlog
 
 from acu_daemon.cli.check import findings
 from acu_daemon.cli.check_finding import NO_GO
+from acu_daemon.cli.check_hooks import HOOKS
 from acu_daemon.cli.configuration_watch import ConfigurationWatch
 from acu_daemon.cli.elements_watch import keep_confirmed
 from acu_daemon.cli.next_rise import NextRise
@@ -25,6 +26,7 @@ from acu_daemon.cli.pass_course import PassCourse
 from acu_daemon.cli.phantom_check import PhantomCheck
 from acu_daemon.cli.schedule_keeper import ScheduleKeeper
 from acu_daemon.cli.station_wind import Beside, StationWind
+from acu_daemon.config.station_day_tables import HooksSection
 from acu_daemon.config.station_tables import StationFile
 from acu_daemon.control.tick_input import StowBy, StowWish
 from acu_daemon.control.tracking.approach import longest_lead_s
@@ -32,9 +34,10 @@ from acu_daemon.daemon.snapshot import Snapshot, StationFacts
 from acu_daemon.daemon.tally import Tally
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.elements_fetching import ElementsFetching
+from acu_daemon.edge.hook_rights import chosen_user
 from acu_daemon.edge.hooks import Hook, Hooks
 from acu_daemon.edge.schedule_file import ScheduleFile
-from acu_daemon.errors import AcuDaemonError
+from acu_daemon.errors import AcuDaemonError, UsageError
 from acu_daemon.model import Pass
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.schedule.book import Entry, PassState
@@ -70,7 +73,8 @@ class StationDay:
         self._files = ConfigurationWatch(config)
         self._good: dict[str, Target] = {}  # satellites as they could be used last
         self._log: Any = structlog.get_logger("station")
-        self.hooks = Hooks(station.hooks.commands, station.hooks.time_limit_s)
+        self._hooks_section = station.hooks
+        self.hooks = Hooks(station.hooks.commands, station.hooks.time_limit_s, chosen_user(station.hooks.user))
         self.keeper = ScheduleKeeper(config, clock, file, station, beside, self._tally)
         self.course = PassCourse(self.keeper, self.hooks, self.about)
         self.checks = PassChecks(check or self._no_gos, beside, self._tell_no_go)
@@ -110,7 +114,17 @@ class StationDay:
         self.keeper.anew_reason = self.keeper.anew_reason or changed
         self.keeper.look(now_tai_s)
         self.wind.section = self.station.wind
+        if self._hooks_section != self.station.hooks:
+            self._take_hooks(self.station.hooks)
         return self._due(now_tai_s)
+
+    def _take_hooks(self, section: HooksSection) -> None:
+        """Other programs, after a reload; as a user who is not there they are not started, and those before stay."""
+        self._hooks_section = section
+        try:
+            self.hooks.take(section.commands, section.time_limit_s, chosen_user(section.user))
+        except UsageError as error:
+            self._log.error("hooks.kept", reason=str(error))
 
     def _due(self, now_tai_s: float) -> str:
         entry = self.keeper.coming()
@@ -142,7 +156,7 @@ class StationDay:
     def _no_gos(self, satellite: str, now_tai_s: float) -> list[str]:
         found = list(findings(self.config, satellite, now_tai_s, self._directory))
         self._tally.checks = {one.what: one.verdict != NO_GO for one in found}
-        return [f"{one.what}: {one.detail}" for one in found if one.verdict == NO_GO]
+        return [f"{one.what}: {one.detail}" for one in found if one.verdict == NO_GO and one.what != HOOKS]
 
     def _tell_no_go(self, entry: Entry, reason: str) -> None:
         self.hooks.call(Hook.ON_NO_GO, self.about(entry) | {"reason": reason})

@@ -44,6 +44,15 @@ class HooksSection(Section):
         description="How long before such a move the horn is started.  Decides how much earlier the antenna sets out.",
     )
 
+    user: Name | None = Field(
+        default=None,
+        json_schema_extra={"range": "a user of this machine"},
+        description=(
+            "As whom the programs are started, with all groups of that user; without it as the daemon's own user.  "
+            "Decides what they may read, write and command."
+        ),
+    )
+
     @property
     def commands(self) -> dict[Hook, Program]:
         return {hook: getattr(self, str(hook)) for hook in Hook}

@@ -1,8 +1,8 @@
 """Programs of the operator's, started at what happens in a pass: receivers, recorders, a horn, a message.
 
-A hook gets one line of JSON on its standard input and runs in a process group of its own, at low priority, without what
-systemd gave this process alone (notification, watchdog).  The loop only starts it and looks at its end: a hook that
-hangs is killed with its group, one that prints without end is cut off, one that fails is told.
+A hook gets one line of JSON on its standard input and runs in a process group of its own, at low priority, without the
+rights that this process was given (edge.hook_rights).  The loop only starts it and looks at its end: a hook that hangs
+is killed with its group, one that prints without end is cut off, one that fails is told.
 """
 
 import asyncio
@@ -18,21 +18,13 @@ from typing import Any
 import structlog
 
 from acu_daemon.edge.child_process import exited, release, start
+from acu_daemon.edge.hook_rights import UMASK, HookUser, directory, environment, launch
 
 KEPT_BYTES = 2000  # of what a hook prints
 MOST_BYTES = 65536  # it may print; then nobody reads on
 GRACE_S = 3.0  # between SIGTERM and SIGKILL
 MOST_RUNNING = 16
 SAID_CHARACTERS = 300  # the last of them are kept for the report
-_OURS = (
-    "NOTIFY_SOCKET",
-    "WATCHDOG_PID",
-    "WATCHDOG_USEC",
-    "LISTEN_FDS",
-    "LISTEN_PID",
-    "MAINPID",
-    "CREDENTIALS_DIRECTORY",
-)
 
 
 class Hook(StrEnum):
@@ -81,13 +73,20 @@ class HookResult:
 class Hooks:
     """Starts hooks and follows them.  Owned by the loop; `close` before the loop ends."""
 
-    def __init__(self, commands: Mapping[Hook, Sequence[str]], time_limit_s: float) -> None:
-        self._commands = {hook: tuple(command) for hook, command in commands.items() if command}
-        self._time_limit_s = time_limit_s
+    def __init__(
+        self, commands: Mapping[Hook, Sequence[str]], time_limit_s: float, user: HookUser | None = None
+    ) -> None:
+        """user: as whom they run; None: as this process."""
+        self.take(commands, time_limit_s, user)
         self._running: dict[asyncio.Task[HookResult], tuple[Hook, int]] = {}  # and the number of its pass
         self._during: asyncio.Task[HookResult] | None = None
         self._results: list[HookResult] = []
         self._log: Any = structlog.get_logger("hooks")
+
+    def take(self, commands: Mapping[Hook, Sequence[str]], time_limit_s: float, user: HookUser | None) -> None:
+        """Which programs are started from here on, and as whom."""
+        self._commands = {hook: tuple(command) for hook, command in commands.items() if command}
+        self._time_limit_s, self._user = time_limit_s, user
 
     def call(self, hook: Hook, about: Mapping[str, Any]) -> None:
         """Start a hook, if there is one.  Never waits.  about: `number` in it is that of the pass."""
@@ -151,12 +150,14 @@ class Hooks:
         begun_s = loop.time()
         try:
             process = await start(
-                *_with_less(command),
+                *launch(command, self._user),
                 stdin=asyncio.subprocess.PIPE,
                 stdout=asyncio.subprocess.PIPE,
                 stderr=asyncio.subprocess.STDOUT,
                 start_new_session=True,
-                env=_environment(hook),
+                env=environment(self._user) | {"ACU_HOOK": str(hook)},
+                cwd=directory(self._user),
+                umask=UMASK,
             )
         except OSError as error:
             return HookResult(hook, None, 0.0, "", f"{command[0]}: {error.strerror or error}")
@@ -186,14 +187,6 @@ async def _ended(process: asyncio.subprocess.Process, limit_s: float | None) -> 
     if status == 0:
         return status, ""
     return status, f"exit status {status}" if status > 0 else f"ended by signal {-status}"
-
-
-def _with_less(command: Sequence[str]) -> list[str]:
-    return ["nice", "-n", "10", *command]
-
-
-def _environment(hook: Hook) -> dict[str, str]:
-    return {name: value for name, value in os.environ.items() if name not in _OURS} | {"ACU_HOOK": str(hook)}
 
 
 async def _read(stream: asyncio.StreamReader | None) -> bytes:
