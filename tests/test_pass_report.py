@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from functools import cache
 from html import unescape
 from pathlib import Path
@@ -19,7 +20,7 @@ from acu_daemon.cli.report_command import make_report, write_index
 from acu_daemon.edge.tape_file import SUFFIX
 from acu_daemon.report.pass_losses import losses_of
 from acu_daemon.report.pass_page import pass_page, verdict_of
-from acu_daemon.report.pass_watch import SeenReading
+from acu_daemon.report.pass_watch import PassWatch, SeenReading
 from acu_daemon.report.svg_chart import ChartLine, chart, nice, sparkline
 
 MOST_BYTES = 1_000_000
@@ -147,6 +148,43 @@ def test_the_command_makes_report_and_index_and_says_where(tmp_path: Path) -> No
     known = numbers_in(index) | {str(len(index["passes"]))}
     assert set(NUMBER.findall(times_and_words_left_out(shown(page)))) - known == set()
     assert acu_daemon("report", tmp_path / "nothing").code == 2
+
+
+def test_a_recording_that_is_none_or_damaged_is_told_and_all_others_have_their_report(tmp_path: Path) -> None:
+    (tmp_path / f"empty{SUFFIX}").write_bytes(b"")  # of a daemon that was killed before its first line
+    with gzip.open(path_of("latch"), "rt") as file:
+        lines = file.read().splitlines()
+    with gzip.open(tmp_path / f"torn{SUFFIX}", "wt") as file:
+        file.write("\n".join([*lines[:800], "W?", *lines[800:]]) + "\n")
+    shutil.copy(path_of("latch"), tmp_path)
+    done = acu_daemon("report", tmp_path)
+    assert done.code == 2
+    assert f"no report: {tmp_path / f'empty{SUFFIX}'}" in done.err
+    assert "line 801: 'W?'" in done.err
+    assert done.out.split() == [str(tmp_path / name) for name in ("latch.html", "torn.html", "index.html")]
+    assert json.loads((tmp_path / "torn.json").read_text())["pass"]["is_recording_whole"] is False
+    assert acu_daemon("report", tmp_path / f"torn{SUFFIX}").code == 1
+
+
+def test_a_pass_that_is_lost_for_good_is_told_as_lost_and_not_as_tracked(tmp_path: Path) -> None:
+    path = tmp_path / f"lost{SUFFIX}"
+    climb(45.0, losses=[(8.0, 60.0)], tape=path)
+    make_report(path, tmp_path)
+    read = json.loads((tmp_path / "lost.json").read_text())
+    assert read["outcome"]["lost_at_end_s"] == pytest.approx(37.0, abs=0.5)
+    assert verdict_of(read) == (f"lost for the last {read['outcome']['lost_at_end_s']} s", "bad")
+    read["outcome"]["lost_at_end_s"] = 12.0  # low above the horizon
+    assert verdict_of(read) == ("tracked through 1 loss", "good")
+
+
+def test_hours_of_waiting_do_not_drown_the_pass() -> None:
+    reading = SeenReading(0.0, 10.0, 20.0, False, False, None, "IDLE", None, None)
+    seen = [replace(reading, tai_s=float(at)) for at in range(0, 7200, 60)]
+    states = [(0.0, "IDLE"), (1.0, "HOLD/TLE"), (2.0, "IDLE"), (7000.0, "POSITION")]
+    shown = PassWatch(readings=seen, states=states, latencies_s=[(1.0, 0.5), (6400.0, 0.1)]).since(6300.0)
+    assert [one.tai_s for one in shown.readings] == [float(at) for at in range(6300, 7200, 60)]
+    assert shown.states == [(6300.0, "IDLE"), (7000.0, "POSITION")]
+    assert shown.latencies_s == [(6400.0, 0.1)]
 
 
 def test_the_index_takes_reports_alone(tmp_path: Path) -> None:

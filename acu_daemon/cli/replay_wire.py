@@ -38,7 +38,7 @@ def replay_pass(path: Path, watcher: Watcher | None = None, *, fits_anew: bool =
         replay.run(tape.records())
     except TapeError as error:
         torn = str(error)
-    return ReplayedPass(taped, replay, tape.is_whole, torn)
+    return ReplayedPass(taped, replay, tape.is_whole and not torn, torn)
 
 
 def replay_wire(path: Path, *, fits_anew: bool) -> None:

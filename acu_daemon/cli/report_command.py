@@ -10,13 +10,14 @@ from acu_daemon.cli.outputs import refuse_unwritable
 from acu_daemon.cli.pass_messages import write_messages
 from acu_daemon.cli.pass_record import read_record
 from acu_daemon.cli.replay_wire import ReplayedPass, replay_pass
-from acu_daemon.edge.tape_file import SUFFIX
+from acu_daemon.edge.tape_file import SUFFIX, tapes_in
 from acu_daemon.edge.writer import replace_file
+from acu_daemon.errors import UsageError
 from acu_daemon.report.pass_figures import pass_figures
 from acu_daemon.report.pass_page import pass_page
 from acu_daemon.report.pass_station import station_figures
 from acu_daemon.report.pass_watch import PassWatch
-from acu_daemon.report.passes_index import index_figures, index_page
+from acu_daemon.report.passes_index import MOST_ROWS, index_figures, index_page
 
 INDEX = "index"
 
@@ -37,7 +38,8 @@ def command(
 
     The page has no outside parts; every figure on it is in the JSON.
 
-    Exit status: 0; 1 a recording does not replay as the daemon decided, so that its report may be wrong; 2 wrong use.
+    Exit status: 0; 1 a recording does not replay as the daemon decided, so that its report may be wrong, or is damaged;
+    2 wrong use, or there is none of one of them: those of all others are made.
     """
     files = [path for given in recordings for path in _recordings(given)]
     if not files:
@@ -45,21 +47,30 @@ def command(
         raise typer.Exit(2)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
-    differing = 0
-    for path in files:
-        done, page = make_report(path, out or path.parent, config)
-        typer.echo(page)
-        if done.difference is not None:
-            differing += 1
-            typer.echo(f"{path}: the replay decides otherwise: {done.difference}", err=True)
+    status = max(_report(path, out or path.parent, config) for path in files)
     for folder in {out or path.parent for path in files}:
         typer.echo(write_index(folder))
-    if differing:
-        raise typer.Exit(1)
+    if status:
+        raise typer.Exit(status)
 
 
 def _recordings(given: Path) -> list[Path]:
-    return sorted(given.glob(f"*{SUFFIX}")) if given.is_dir() else [given]
+    return tapes_in(given) if given.is_dir() else [given]
+
+
+def _report(path: Path, folder: Path, config: Path | None) -> int:
+    """Make one, and say where, or what is wrong with it; the exit status."""
+    try:
+        done, page = make_report(path, folder, config)
+    except UsageError as error:  # such as a recording of a daemon that was killed before its first line
+        typer.echo(f"no report: {error}", err=True)
+        return 2
+    typer.echo(page)
+    if done.torn:
+        typer.echo(f"{path}: {done.torn}", err=True)
+    if done.difference is not None:
+        typer.echo(f"{path}: the replay decides otherwise: {done.difference}", err=True)
+    return 1 if done.torn or done.difference is not None else 0
 
 
 def make_report(path: Path, folder: Path, config: Path | None = None) -> tuple[ReplayedPass, Path]:
@@ -91,7 +102,9 @@ def make_report(path: Path, folder: Path, config: Path | None = None) -> tuple[R
 def write_index(folder: Path) -> Path:
     """Write the page of all reports in a directory."""
     reports: list[tuple[str, dict[str, Any]]] = []
-    for path in sorted(folder.glob("*.json")):
+    for path in sorted(folder.glob("*.json"), reverse=True):
+        if len(reports) == MOST_ROWS:
+            break
         if path.stem == INDEX:
             continue
         try:
@@ -100,7 +113,7 @@ def write_index(folder: Path) -> Path:
             continue
         if isinstance(read, dict) and "outcome" in read and "curves" in read:
             reports.append((path.stem, read))
-    index = index_figures(reports)
+    index = index_figures(reports[::-1])
     page = folder / f"{INDEX}.html"
     refuse_unwritable(page)
     replace_file(folder / f"{INDEX}.json", f"{json.dumps(index, allow_nan=False)}\n".encode())

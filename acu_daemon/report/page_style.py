@@ -25,13 +25,12 @@ th,td{text-align:left;padding:4px 10px 4px 0;border-bottom:1px solid var(--rule)
 th{color:var(--dim);font-weight:600;font-size:13px}td.n,th.n{text-align:right}.wide{overflow-x:auto}
 svg{display:block;width:100%;height:auto}.chart{background:var(--card);border:1px solid var(--rule);border-radius:6px}
 svg .grid{stroke:var(--rule);fill:none;stroke-width:1}svg .axis{fill:var(--dim);font:11px system-ui,sans-serif}
-
 svg .unit{fill:var(--ink);font-weight:600}
 svg .mark{stroke:var(--bad);stroke-dasharray:5 4;stroke-width:1;fill:none}svg .line{fill:none;stroke-width:1.7}
 svg .dots{fill:none;stroke-width:2.4;stroke-linecap:round}svg .a{stroke:var(--a)}svg .b{stroke:var(--b)}
 svg .good{stroke:var(--good)}svg .bad{stroke:var(--bad)}svg .sigma{stroke:none;opacity:.18}svg .sigma.a{fill:var(--a)}
 svg .sigma.b{fill:var(--b)}svg .end{fill:var(--paper);stroke:var(--ink);stroke-width:2}svg .end.end{fill:var(--ink)}
-svg .end.begin{fill:var(--paper)}svg .sky .line{stroke-width:3}.sky .line{stroke-width:3}svg .band{stroke:none}
+svg .end.begin{fill:var(--paper)}.sky .line{stroke-width:3}svg .band{stroke:none}
 svg .auto{fill:var(--auto)}svg .hold{fill:var(--hold)}svg .search{fill:var(--search)}svg .other{fill:var(--other)}
 .spark{width:150px;height:34px}.key{display:inline-block;width:12px;height:12px;border-radius:3px;margin:0 5px 0 14px;
 vertical-align:-1px}.key.auto{background:var(--auto);border:1px solid var(--rule)}.key.hold{background:var(--hold)}

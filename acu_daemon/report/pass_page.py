@@ -13,6 +13,8 @@ from acu_daemon.report.pass_sections import (
 from acu_daemon.report.pass_station import station_section
 from acu_daemon.report.svg_chart import sky_chart
 
+LOW_S = 30.0  # before the set: nobody's fault so near to the horizon
+
 
 def pass_page(figures: Figures) -> str:
     """The report of a pass (report.pass_figures)."""
@@ -43,8 +45,8 @@ def verdict_of(figures: Figures) -> tuple[str, str]:
     if outcome["first_acquired_utc"] is None:
         return "never acquired", "bad"
     losses = figures["losses"]
-    if any(one["length_s"] is None for one in losses[:-1]):
-        return "lost", "bad"
+    if (lost_s := outcome.get("lost_at_end_s") or 0.0) > LOW_S:  # a report of before has none
+        return f"lost for the last {lost_s} s", "bad"
     if not losses:
         return "tracked without a loss", "good"
     farthest = outcome["largest_off_path_in_losses_beamwidths"]

@@ -3,16 +3,13 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from itertools import pairwise
 from typing import Any
 
 from acu_daemon.control.phantom import LostSpan, PhantomPass
 from acu_daemon.daemon.service import PassJob
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.report.page_parts import Figures, table, text, time_of_day
-from acu_daemon.report.pass_watch import PassWatch, SeenReading
-
-LONGEST_GAP_S = 0.2  # between two readings that stands for time seen
+from acu_daemon.report.pass_watch import PassWatch, SeenReading, seconds_where
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +45,7 @@ def _phantom(found: PhantomPass, job: PassJob, watch: PassWatch) -> dict[str, An
         seen = [one for one in watch.readings if coming.rise_tai_s <= one.tai_s <= coming.set_tai_s]
     up = [one for one in seen if not any(begin <= one.tai_s <= end for begin, end in hidden)]
     near = [one.off_path_deg for one in up if one.off_path_deg is not None and one.off_path_deg <= half_deg]
+    on_path_s, lost_s = _seconds(up, half_deg, is_near=True), _seconds(up, half_deg, is_near=False)
     return {
         "words": str(found),
         "no_go": found.no_go,
@@ -55,9 +53,9 @@ def _phantom(found: PhantomPass, job: PassJob, watch: PassWatch) -> dict[str, An
         "on_path_s": round(found.on_path_s, 1),
         "lost_s": round(found.up_s - found.on_path_s, 1),
         "largest_off_deg": round(found.largest_off_deg, 3),
-        "came_up_s": round(_seconds(up, half_deg, is_near=True) + _seconds(up, half_deg, is_near=False), 1),
-        "came_on_path_s": round(_seconds(up, half_deg, is_near=True), 1),
-        "came_lost_s": round(_seconds(up, half_deg, is_near=False), 1),
+        "came_up_s": round(on_path_s + lost_s, 1),
+        "came_on_path_s": round(on_path_s, 1),
+        "came_lost_s": round(lost_s, 1),
         "came_largest_off_deg": round(max(near), 3) if near else None,
         "lost": [_lost(one, seen, half_deg) for one in found.lost],
         "told": list(found.told),
@@ -76,13 +74,10 @@ def _lost(one: LostSpan, seen: Sequence[SeenReading], half_deg: float) -> dict[s
 
 
 def _seconds(readings: Sequence[SeenReading], half_deg: float, *, is_near: bool) -> float:
-    """How long the antenna was within half the beam of the path, or out of it; a gap counts as a tick or two."""
-    spans = [
-        min(after.tai_s - one.tai_s, LONGEST_GAP_S)
-        for one, after in pairwise(readings)
-        if one.off_path_deg is not None and (one.off_path_deg <= half_deg) == is_near
-    ]
-    return sum(spans, 0.0)
+    """How long the antenna was within half the beam of the path, or out of it."""
+    return seconds_where(
+        readings, lambda one: one.off_path_deg is not None and (one.off_path_deg <= half_deg) == is_near
+    )
 
 
 def station_section(figures: Figures) -> str:

@@ -1,6 +1,9 @@
 """What a replay of a recording shows, gathered for the report of its pass.  Nothing is computed here that costs."""
 
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from math import inf
 from typing import Any
 
 from acu_daemon.acu.commands import AcuMode, command_text
@@ -12,6 +15,8 @@ from acu_daemon.control.tick_input import Arrival, PassPlan
 from acu_daemon.daemon.area import CommonArea
 from acu_daemon.edge.tape import Record
 from acu_daemon.model import FitResult, Prediction, Readings, sky_angle_deg
+
+LONGEST_GAP_S = 0.2  # between two readings that stands for time seen
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +35,11 @@ class SeenReading:
     state: str
     off_path_deg: float | None
     sigma_deg: float | None
+
+
+def seconds_where(readings: Sequence[SeenReading], is_so: Callable[[SeenReading], bool]) -> float:
+    """How long something was so, of readings in their order; a gap counts as a tick or two."""
+    return sum((min(b.tai_s - a.tai_s, LONGEST_GAP_S) for a, b in pairwise(readings) if is_so(a)), 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +68,17 @@ class PassWatch:
     plan: PassPlan | None = None
     prediction: Prediction | None = None
     area: CommonArea | None = None
+
+    def since(self, tai_s: float) -> "PassWatch":
+        """The same without what the line and the states showed before an instant."""
+        return replace(
+            self,
+            states=[
+                (max(at, tai_s), state) for (at, state), (end, _) in pairwise([*self.states, (inf, "")]) if end > tai_s
+            ],
+            readings=[one for one in self.readings if one.tai_s >= tai_s],
+            latencies_s=[one for one in self.latencies_s if one[0] >= tai_s],
+        )
 
     def ticked(self, area: CommonArea, now_tai_s: float, orders: Orders) -> None:
         """A tick was decided."""

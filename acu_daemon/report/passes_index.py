@@ -18,12 +18,12 @@ DRIFTING = (  # key of a row, what it is called
     ("off_path_beamwidths", "off the path in losses, beamwidths"),
     ("latency_p99_ms", "latency, 99 %, ms"),
 )
-MOST_ROWS = 2000
+MOST_ROWS = 2000  # of the newest reports
 
 
 def index_figures(reports: Sequence[tuple[str, dict[str, Any]]]) -> dict[str, Any]:
     """A row for each report, by name, the oldest first."""
-    rows = [_row(name, figures) for name, figures in reports][-MOST_ROWS:]
+    rows = [_row(name, figures) for name, figures in reports]
     rows.sort(key=lambda row: row["rise_utc"] or "")
     stations = sorted({row["station"] for row in rows})
     return {"format": 1, "stations": stations, "passes": rows}
