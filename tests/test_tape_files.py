@@ -7,6 +7,7 @@ import json
 import os
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from test_station import START, configured
 
 from acu_daemon.assist.mount_memory.pedestal_memory import first_memory
 from acu_daemon.assist.session.refit import GateVerdict, RefitReply
+from acu_daemon.cli import pass_tape
 from acu_daemon.cli.pass_tape import begin_tape, note_hooks
 from acu_daemon.cli.replay_wire import replay_pass
 from acu_daemon.cli.report_after import report_after
@@ -190,8 +192,22 @@ def test_a_recording_that_no_disk_takes_ends_and_is_an_alarm_and_nothing_else(
     ]
 
 
+@pytest.mark.parametrize("record", [("I", "hook", {"lasted_s": float("nan")}), ("?", 1), ("X", NOW)])
+def test_what_cannot_be_written_ends_the_recording_without_a_gap_and_is_an_alarm(
+    tmp_path: Path, record: Record
+) -> None:
+    kept = tape(tmp_path / f"a{SUFFIX}")
+    for one in [*ticks(20), record, *ticks(20)]:
+        kept.note(one)
+    kept.close()
+    assert kept.problem.startswith(f"a{SUFFIX}: ")
+    read = list(read_tape(kept.path).records())
+    assert 10 < len(read) < 40
+    assert read == ticks(20)[: len(read)]
+
+
 def aged(directory: Path, name: str, days: float, size: int = 1000) -> None:
-    path = directory / f"{name}{SUFFIX}"
+    path = directory / (name if "." in name else f"{name}{SUFFIX}")
     path.write_bytes(bytes(size))
     os.utime(path, (1e9 - 86400 * days, 1e9 - 86400 * days))
 
@@ -202,7 +218,7 @@ def test_old_recordings_and_the_oldest_of_too_many_are_removed_and_told(tmp_path
     (tmp_path / "a.html").write_text("stays")
     (tmp_path / "a.tdm").write_text("goes")
     with capture_logs() as logs:
-        gone = remove_old(tmp_path, KeepRules(30.0, 1.0), 1e9)
+        gone = remove_old(tmp_path, KeepRules(30.0, 1.0, 400.0), 1e9)
     assert [path.name[0] for path in gone] == ["a", "b"]
     assert (logs[0]["event"], logs[0]["count"], logs[0]["reason"]) == (
         "tape.removed",
@@ -210,7 +226,20 @@ def test_old_recordings_and_the_oldest_of_too_many_are_removed_and_told(tmp_path
         "older than 30 d, more than 1 MB",
     )
     assert sorted(path.name[0] for path in tmp_path.iterdir()) == ["a", "c", "d"]
-    assert remove_old(tmp_path / "nowhere", KeepRules(30.0, 1.0)) == []
+    assert remove_old(tmp_path / "nowhere", KeepRules(30.0, 1.0, 400.0)) == []
+
+
+def test_old_reports_are_removed_and_nothing_that_is_none(tmp_path: Path) -> None:
+    old, other = "20260818T124411Z-DEMO-1", ["index.html", "index.json", "mine.json", "20260818T124411Z-DEMO-1.txt"]
+    for name in (f"{old}.html", f"{old}.json", *other):
+        aged(tmp_path, name, 500.0)
+    aged(tmp_path, "20280818T124411Z-DEMO-1.html", 300.0)
+    aged(tmp_path, f"{old}.station.json", 500.0)
+    with capture_logs() as logs:
+        assert remove_old(tmp_path, KeepRules(1000.0, 1.0, 400.0), 1e9) == []
+    assert [(one["event"], one["file_count"]) for one in logs] == [("report.removed", 2)]
+    stay = [*other, "20280818T124411Z-DEMO-1.html", f"{old}.station.json"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(stay)
 
 
 @pytest.mark.parametrize(("name", "part"), [("SCD-1", "SCD-1"), ("../x y", "x-y"), ("ü", "satellite")])
@@ -248,6 +277,17 @@ def test_a_station_that_wants_none_has_no_recording(tmp_path: Path) -> None:
     link: Any = None
     off = demo_target(recording={"passes": False})
     assert begin_tape(tmp_path, off, job, link, NOW, Writer("w")) is None
+
+
+def test_a_head_that_cannot_be_written_costs_the_recording_and_no_pass(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job: Any = SimpleNamespace(coming=SimpleNamespace(rise_tai_s=NOW), satellite="S")
+    link: Any = None
+    monkeypatch.setattr(pass_tape, "head_of", lambda *_: {"byte_time_s": float("inf")})
+    with capture_logs() as logs:
+        assert begin_tape(tmp_path, demo_target(), job, link, NOW, Writer("w")) is None
+    assert [one["event"] for one in logs] == ["tape.ended"]
 
 
 def test_a_station_records_each_pass_with_its_schedule_and_has_the_report_made(tmp_path: Path) -> None:

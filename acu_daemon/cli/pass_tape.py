@@ -26,14 +26,14 @@ def begin_tape(
     if not rules.passes or job.coming is None:
         return None
     folder = directory / PASSES
-    files.put(partial(_remove_old, folder, KeepRules(rules.keep_days, rules.keep_mb)))
+    files.put(partial(_remove_old, folder, KeepRules(rules.keep_days, rules.keep_mb, rules.keep_reports_days)))
     try:
         head = head_of(target, job, link, now_tai_s)
-    except (ElementsError, ValueError) as error:
+        return TapeFile(folder / tape_name(job.coming.rise_tai_s, job.satellite), head, files)
+    except (ElementsError, ValueError, TypeError) as error:  # no pass is missed for a recording
         log: Any = structlog.get_logger("tape")
         log.warning("tape.ended", reason=str(error))
         return None
-    return TapeFile(folder / tape_name(job.coming.rise_tai_s, job.satellite), head, files)
 
 
 def note_hooks(tape: TapeFile, results: Iterable[HookResult]) -> None:

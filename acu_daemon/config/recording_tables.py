@@ -19,6 +19,12 @@ class RecordingSection(Section):
         le=36500,
         description="Older recordings and messages are removed when a pass begins.  Decides that; reports stay.",
     )
+    keep_reports_days: float = Field(
+        default=1000.0,
+        ge=1,
+        le=36500,
+        description="Older reports are removed when a pass is recorded.  Decides that; the index has the newest 2000.",
+    )
     keep_mb: float = Field(
         default=1000.0,
         ge=1,

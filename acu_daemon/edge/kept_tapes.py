@@ -1,4 +1,4 @@
-"""The recordings of a station's passes: how they are called, and which are removed so that a disk does not fill."""
+"""What is kept of a station's passes: how it is called, and what is removed so that a disk does not fill."""
 
 import contextlib
 import re
@@ -17,15 +17,18 @@ from acu_daemon.units import DAY_S
 _LONGEST_NAME = 40
 STATION = ".station.json"  # what the station knows of a pass beside its recording
 MESSAGES = (".tdm", ".omm", ".oem", STATION)  # of the pass, which go with its recording
+REPORTS = (".html", ".json")  # of a pass, which outlive its recording
 PASSES = "passes"  # the folder in a state directory
+_OF_A_PASS = re.compile(r"\d{8}T\d{6}Z-")  # how the names of this module begin: what others put there is not ours
 
 
 @dataclass(frozen=True, slots=True)
 class KeepRules:
-    """How long recordings are kept, and how much of them."""
+    """How long recordings are kept, and how much of them; how long reports are."""
 
     days: float
     megabytes: float
+    report_days: float
 
 
 def tape_name(rise_tai_s: float, satellite: str) -> str:
@@ -40,8 +43,12 @@ def safe_name(satellite: str) -> str:
 
 
 def remove_old(directory: Path, rules: KeepRules, now_unix_s: float | None = None) -> list[Path]:
-    """Remove the recordings that are too old or too many, with their messages, the oldest first; told in the log."""
+    """Remove what is too old or too much, told in the log; the recordings that are gone.
+
+    Recordings go with their messages, the oldest first; reports by their age alone.
+    """
     now_s = time.time() if now_unix_s is None else now_unix_s
+    _remove_reports(directory, rules.report_days, now_s)
     found: list[tuple[float, int, Path]] = []
     for path in tapes_in(directory):
         with contextlib.suppress(OSError):
@@ -61,6 +68,30 @@ def remove_old(directory: Path, rules: KeepRules, now_unix_s: float | None = Non
     if gone:
         log.info("tape.removed", count=len(gone), newest=gone[-1].name, reason=why)
     return gone
+
+
+def _remove_reports(directory: Path, days: float, now_s: float) -> None:
+    count = 0
+    for path in reports_in(directory):
+        with contextlib.suppress(OSError):  # it is tried again at the next pass
+            if now_s - path.stat().st_mtime > days * DAY_S:
+                path.unlink()
+                count += 1
+    if count:
+        log: Any = structlog.get_logger("report")
+        log.info("report.removed", file_count=count, reason=f"older than {days:g} d")
+
+
+def reports_in(directory: Path) -> list[Path]:
+    """The files of the reports of a directory's passes, without the index."""
+    try:
+        return [
+            path
+            for path in directory.iterdir()
+            if path.suffix in REPORTS and _OF_A_PASS.match(path.name) and not path.name.endswith(STATION)
+        ]
+    except OSError:
+        return []
 
 
 def messages_beside(tape: Path) -> list[Path]:

@@ -15,6 +15,7 @@ them elsewhere (edge/tape_text.py), and a replay reads the same tuples back.
 | H | | the reply is taken in for the next tick |
 | P | TAI | the pass is planned |
 | S | TAI | the buffer for that plan |
+| U | TAI | the run goes on with the fit that this pass had before |
 | B | TAI, low water s or None | the daemon fills the buffer itself |
 | A | TAI | the fit is asked, with the readings that wait |
 | F | reply | its answer |

@@ -91,7 +91,11 @@ class TapeFile:
     def _write(self, batch: list[Record]) -> None:
         if self._is_over:
             return
-        text = "".join(map(self._lines.line, batch)).encode()
+        try:
+            text = "".join(map(self._lines.line, batch)).encode()
+        except (ValueError, TypeError) as error:  # what comes after a gap could not be replayed
+            self._end(str(error))
+            return
         self._append(self._packer.compress(text) + self._packer.flush(zlib.Z_SYNC_FLUSH))
         if self._size > self._largest_bytes and not self._is_over:
             self._end(f"it has {self._size / 1e6:.0f} MB")
