@@ -24,7 +24,10 @@ from acu_daemon.orbit.timescales import utc_text
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 COLOURS = 255
 LOSSES_S = ((60.0, 75.0), (120.0, 140.0), (175.0, 240.0))  # of the signal, after the start
-SEARCHED_LATE_S = 12.0  # of a search's satellite
+FAR_OFF = (  # of a search's satellite, so that it is beside the first row; in place of the demo's
+    ("along_track_s = 0.9", "along_track_s = 12.0"),
+    ("delta_raan_deg = 0.015", "delta_raan_deg = 0.3"),
+)
 AROUND = """
 [envelope]
 mask = [[0, 12], [60, 6], [110, 28], [150, 6], [230, 8], [280, 22], [330, 8]]
@@ -60,7 +63,10 @@ def with_losses(rig: Rig) -> None:
 
 def far_off(rig: Rig) -> None:
     scenario, station = rig.config / "scenario.toml", rig.config / "station.toml"
-    scenario.write_text(scenario.read_text().replace("along_track_s = 0.9", f"along_track_s = {SEARCHED_LATE_S}"))
+    text = scenario.read_text()
+    for of_the_demo, far in FAR_OFF:
+        text = text.replace(of_the_demo, far)
+    scenario.write_text(text)
     station.write_text(station.read_text() + AROUND)
 
 
