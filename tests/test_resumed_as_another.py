@@ -18,11 +18,11 @@ from acu_daemon.assist.mount_model import encoder_look
 from acu_daemon.cli.kept import Kept, open_kept
 from acu_daemon.cli.options import coming_pass, load_target
 from acu_daemon.config.to_settings import estimator_settings
-from acu_daemon.control.state import ControlState
+from acu_daemon.control.state import ByHand, ControlState, Nudge
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.writer import Writer
-from acu_daemon.model import FitResult, Readings
+from acu_daemon.model import FitResult, Model, Readings
 from acu_daemon.orbit.timescales import tai_from_utc
 
 NEAR_TAI_S = tai_from_utc("1989-01-31T15:00:00Z")
@@ -40,6 +40,7 @@ ELEMENTS = {
     "perigee": ("arg_perigee_deg = 15.47", "arg_perigee_deg = 15.471"),
     "mean anomaly": ("mean_anomaly_deg = 350.56", "mean_anomaly_deg = 350.561"),
 }
+BY_HAND = ByHand(is_held=True, nudge=Nudge(0.2, -0.1, Model.NEW_FIT))
 NAME = ('name = "SCD-1"', 'name = "SCD-2"')
 
 
@@ -79,7 +80,7 @@ class Place:
         kept, files = self.opened()
         kept.see(remembering(track=TrackState.AUTOTRACK_FITTED, by_people=True))
         kept.offer(self.fit())
-        kept.see(remembering(track=TrackState.HOLD_FITTED, by_people=True))
+        kept.see(remembering(track=TrackState.HOLD_FITTED, by_people=True, by_hand=BY_HAND))
         kept.flush()
         assert files.close(60.0)
 
@@ -100,6 +101,7 @@ def test_the_same_run_is_gone_on_from_with_its_fit_and_its_memory(tmp_path: Path
     assert carried.is_of_this_pass
     assert carried.estimator == estimator
     assert state.arming.by_people is True
+    assert state.by_hand == BY_HAND
     assert "run.resumed" in said
 
 
@@ -134,9 +136,10 @@ def test_a_fit_to_other_elements_is_used_by_nobody(tmp_path: Path, part: str) ->
     place = Place(tmp_path)
     place.leave()
     place.configure(satellite=replaced(BROUWER, *ELEMENTS[part]))
-    carried, _, said = place.gone_on_from()
+    carried, state, said = place.gone_on_from()
     assert carried is None
     assert {"run_state.dropped", "carry_over.dropped"} <= set(said)
+    assert state.by_hand == (ByHand(is_held=True) if part == "epoch" else BY_HAND)
 
 
 def test_another_satellite_takes_neither_the_fit_nor_the_memory(tmp_path: Path) -> None:
@@ -144,7 +147,7 @@ def test_another_satellite_takes_neither_the_fit_nor_the_memory(tmp_path: Path) 
     place.leave()
     place.configure(satellite=replaced(BROUWER, *NAME))
     carried, state, said = place.gone_on_from()
-    assert (carried, state.arming.by_people) == (None, None)
+    assert (carried, state.arming.by_people, state.by_hand) == (None, None, ByHand())
     assert "run.resumed" not in said
 
 
@@ -168,4 +171,4 @@ def test_another_pass_or_rehearsal_takes_only_what_a_pass_leaves_to_the_next(
     assert "carry_over.used" in said
     assert carried is not None
     assert not carried.is_of_this_pass
-    assert state.arming.by_people is None
+    assert (state.arming.by_people, state.by_hand) == (None, ByHand())

@@ -12,13 +12,16 @@ from memories import remembering
 from structlog.testing import capture_logs
 from test_carry_over_file import CARRIED, FIT
 
-from acu_daemon.control.state import Held
+from acu_daemon.control.state import ByHand, Held, Nudge
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.edge.run_state import RETRY_TICKS, RUN_STATE, RunState, RunStateKeeper, read_run_state
 from acu_daemon.edge.writer import Writer
-from acu_daemon.model import Pass
+from acu_daemon.model import Model, Pass
 
-STATE = RunState("ISS (25544)", 1000.0, 1600.0, None, "HOLD/FITTED", True, held=False, fit=CARRIED)
+BY_HAND = ByHand(is_held=True, nudge=Nudge(0.1, -0.25, Model.NEW_FIT))
+STATE = RunState(
+    "ISS (25544)", 1000.0, 1600.0, None, "HOLD/FITTED", True, held=False, fit=CARRIED, by_hand=BY_HAND, elements="TLE"
+)
 COMING = Pass(1000.2, 1300.0, 1600.1, 10.0, 60.0, 90.0, 170.0)
 
 
@@ -26,7 +29,7 @@ def written(directory: Path, state: RunState = STATE) -> Path:
     writer = Writer("files")
     keeper = RunStateKeeper(directory, writer, replace(state, track=""), lambda _: None)
     held = None if state.held is None else Held(state.held)
-    keeper.see(remembering(track=TrackState(state.track), by_people=state.arming, held=held))
+    keeper.see(remembering(track=TrackState(state.track), by_people=state.arming, held=held, by_hand=state.by_hand))
     assert writer.close(60.0)
     return directory / RUN_STATE
 
@@ -77,7 +80,8 @@ def test_p10_every_cut_of_a_file_is_an_alarm(tmp_path: Path) -> None:
 def test_p4_a_file_of_an_older_version_that_holds_nothing_of_the_antenna_is_read(tmp_path: Path) -> None:
     path = written(tmp_path)
     old = json.loads(path.read_text())
-    del old["held"]
+    for key in ("held", "by_hand", "elements"):
+        del old[key]
     path.write_text(json.dumps(old))
     read = read_run_state(tmp_path)
     assert (read.track, read.held, read.is_stow_kept) == ("HOLD/FITTED", None, False)
@@ -128,7 +132,7 @@ def test_another_rehearsal_of_the_pass_is_not_gone_on_with(clock_s: float | None
 def test_a_change_is_written_and_a_tick_without_one_is_not(tmp_path: Path) -> None:
     writer = Writer("files")
     keeper = RunStateKeeper(tmp_path, writer, STATE, lambda fit: replace(CARRIED, at_tai_s=fit.at_tai_s))
-    state = remembering(track=TrackState.HOLD_FITTED, by_people=True, held=Held())
+    state = remembering(track=TrackState.HOLD_FITTED, by_people=True, held=Held(), by_hand=BY_HAND)
     for _ in range(10):
         keeper.see(state)
     while writer.waiting_count or keeper._latest._is_waiting:

@@ -4,16 +4,19 @@ from pathlib import Path
 
 import pytest
 from test_clock_set_late import between_runs
-from test_station import START, night
+from test_station import START, configured, night
 from test_station_stow import RISE, modes, says
 
 from acu_daemon.acu.commands import AcuMode
 from acu_daemon.cli.pass_course import KeptNudge
-from acu_daemon.cli.virtual_station import StationAccess
+from acu_daemon.cli.virtual_station import KilledError, StationAccess, run_days
+from acu_daemon.daemon.snapshot import Snapshot
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.schedule.book import PassState
+from acu_daemon.sim.trace import TraceRow
 
 ENDS_S = 4.8  # minutes from START
+ACROSS_DEG = 0.4
 
 
 def test_a_pass_that_is_skipped_is_given_up_with_a_stop_and_cancelled(tmp_path: Path) -> None:
@@ -87,3 +90,47 @@ def test_a_nudge_that_is_kept_is_of_the_satellite_while_its_elements_hold(tmp_pa
     assert answers[0] == "ok nudged: +0.50 s late, +0.000 deg right in all"
     assert kept[0] is not None
     assert (kept[0].along_s, kept[1], kept[2]) == (0.5, kept[0], None)
+
+
+def test_a_hold_and_a_nudge_survive_a_kill_in_the_pass_with_the_fit_that_they_are_of(tmp_path: Path) -> None:
+    """The antenna follows the moved path before the kill and after it; both are over with the pass."""
+    answers: list[str] = []
+    seen: list[Snapshot] = []
+
+    def look(access: StationAccess) -> None:
+        assert access.runs.service is not None
+        seen.append(access.runs.service.snapshot())
+
+    def kill(access: StationAccess) -> None:
+        look(access)
+        raise KilledError
+
+    config, state = configured(tmp_path / "config"), tmp_path / "state"
+    state.mkdir()
+    killed_at, ends = RISE + 30.0, RISE + 60.0
+    begin = [
+        (RISE + 20.0, says("hold", answers)),
+        (RISE + 21.0, says(f"nudge across_deg={ACROSS_DEG}", answers)),
+        (killed_at, kill),
+    ]
+    killed = run_days(config, state, START, ends, script=begin)
+    after = [(killed_at + 12.0, look), (killed_at + 13.0, says("nudge across_deg=0", answers))]
+    after += [(killed_at + 20.0, look)]
+    days = run_days(config, state, killed_at + 1.0, ends, script=after, before=killed)
+    assert [answer[:2] for answer in answers] == ["ok"] * 3
+    assert [one.is_held_by_person for one in seen] == [True] * 3
+    assert [one.nudge_across_deg for one in seen] == [ACROSS_DEG, ACROSS_DEG, 0.0]
+    errors_deg = [
+        worst_beam_error_deg(one.rows, *span)
+        for one, span in (
+            (killed, (killed_at - 3.0, killed_at)),
+            (days, (killed_at + 9.0, killed_at + 12.0)),
+            (days, (killed_at + 17.0, killed_at + 20.0)),
+        )
+    ]
+    assert errors_deg == [pytest.approx(ACROSS_DEG, abs=0.08)] * 2 + [pytest.approx(0.0, abs=0.08)]
+    assert days.named("run.resumed") != []
+
+
+def worst_beam_error_deg(rows: list[TraceRow], from_tai_s: float, to_tai_s: float) -> float:
+    return max(row.beam_error_deg for row in rows if from_tai_s < row.tai_s < to_tai_s)

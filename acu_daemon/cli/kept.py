@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -99,7 +99,8 @@ def open_kept(
     if coming is None and not is_another:
         state = _first_state(RunState(held=left.held), latch, disarmed_by, stow_by)
     else:
-        state = _first_state(left if is_same_pass else RunState(), latch, disarmed_by, stow_by)
+        of_pass = replace(left, by_hand=left.by_hand_with(target.elements.about)) if is_same_pass else RunState()
+        state = _first_state(of_pass, latch, disarmed_by, stow_by)
     resumed = _resumed(left, target, now_tai_s) if is_same_pass else None
     path = carry_over_path(directory, target.satellite.satellite.norad_id, target.satellite.satellite.name)
     from_path = _first_with(path.name, directory, older) / path.name
@@ -120,6 +121,8 @@ def open_kept(
         clock_s=clock_s,
         arming=state.arming.by_people,
         fit=resumed,
+        by_hand=state.by_hand,
+        elements=target.elements.about,
     )
     return Kept(
         carried=resumed or _carried(target, from_path, now_tai_s),
@@ -156,6 +159,7 @@ def _first_state(left: RunState, latch: str, disarmed_by: str, stow_by: StowBy) 
         latch=latch,
         held=None if left.held is None else Held(left.held),
         stow_by=stow_by,
+        by_hand=left.by_hand,
     )
 
 

@@ -163,7 +163,7 @@ def make_job(
         elements_epoch_tai_s=target.elements.epoch_tai_s,
         satellite=target.satellite.satellite.name,
         station=station.station.name,
-        elements=f"{target.elements.propagator.kind} of {utc_text(target.elements.epoch_tai_s, 0)}",
+        elements=target.elements.about,
     )
 
 

@@ -14,6 +14,7 @@ from acu_daemon.daemon.service import PassJob
 from acu_daemon.edge import carry_over_file, mount_memory_file
 from acu_daemon.edge.elements_file import LoadedElements
 from acu_daemon.edge.mount_memory_file import MountFile
+from acu_daemon.edge.run_state import by_hand_json, by_hand_of
 from acu_daemon.edge.stored_orbit import orbit_json, orbit_of
 from acu_daemon.errors import AcuDaemonError, UsageError
 from acu_daemon.model import Pass
@@ -65,6 +66,7 @@ def head_of(target: Target, job: PassJob, link: Any, begun_tai_s: float) -> dict
             "latch": state.latch.problem,
             "held": None if held is None else asdict(held),
             "stow_by": str(state.stow.stow_by),
+            "by_hand": by_hand_json(state.by_hand),
         },
         "carried": None if refit.carried is None else carry_over_file.to_json("", refit.carried),
         "is_resumed": refit.is_resumed,
@@ -106,7 +108,8 @@ def _taped_pass(head: dict[str, Any]) -> TapedPass:
     )
     control = replace(job.control, is_shadow=head["is_shadow"], is_resting=head["is_resting"])
     held = None if left["held"] is None else Held(**left["held"])
-    state = remembered(**{**left, "held": held, "stow_by": StowBy(left["stow_by"])})
+    by_hand = by_hand_of(left.get("by_hand"))
+    state = remembered(**{**left, "held": held, "stow_by": StowBy(left["stow_by"]), "by_hand": by_hand})
     return TapedPass(
         target, replace(job, control=control, state=state), head["begun_tai_s"], head["link"], head["version"]
     )

@@ -323,9 +323,14 @@ def remembered(
     latch: str,
     held: Held | None,
     stow_by: StowBy,
+    by_hand: ByHand = ByHand(),
 ) -> ControlState:
-    """The memory that a run begins with: what people and the antenna have told the one before it."""
+    """The memory that a run begins with: what people and the antenna have told the one before it.
+
+    by_hand: where the run goes on with a pass.
+    """
     return ControlState(
+        by_hand=by_hand,
         arming=Arming(by_people, disarmed_by, is_stop_due),
         foreign_stop=ForeignStop(held),
         stow=Stowing(stow_by),

@@ -24,6 +24,7 @@ from acu_daemon.orbit.named_sets import named_sets
 from acu_daemon.orbit.propagator import Propagator
 from acu_daemon.orbit.selection import is_of, select_elements, select_segments
 from acu_daemon.orbit.sgp4_source import Sgp4Propagator
+from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.units import DEG
 
 NAMED_PROBLEMS = 5
@@ -46,6 +47,11 @@ class LoadedElements:
     file: str = ""  # where it was read
     expected_m: float = inf  # how far off along the track it is expected to be, where sources were compared
     confirmed_tai_s: float | None = None  # epoch of a set that was doubtful, and that the last pass bears out
+
+    @property
+    def about(self) -> str:
+        """Which they are, for people: their kind and epoch."""
+        return f"{self.propagator.kind} of {utc_text(self.epoch_tai_s, 0)}"
 
 
 def load_elements(

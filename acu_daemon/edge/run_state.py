@@ -1,7 +1,7 @@
-"""What a restart needs (run.json in the state directory): the pass in progress, its newest fit, arming.
+"""What a restart needs (run.json in the state directory): the pass in progress, its newest fit, what people said of it.
 
-Written whole, beside the loop, at every accepted fit and whenever state or arming change.  A latch, a disarm and a
-stow have files of their own.
+Written whole, beside the loop, at every accepted fit and whenever state, arming, hold or nudge change.  A latch, a
+disarm and a stow have files of their own.
 """
 
 import contextlib
@@ -15,11 +15,12 @@ from typing import Any
 import structlog
 
 from acu_daemon.assist.estimators.full.carry_over import CarryOver
-from acu_daemon.control.state import ControlState
+from acu_daemon.control.state import ByHand, ControlState, Nudge
+from acu_daemon.control.tracking.by_hand import by_hand_before
 from acu_daemon.edge.carry_over_file import from_json, number, reason_of, to_json
 from acu_daemon.edge.writer import Latest, Writer, replace_file
 from acu_daemon.errors import OrbitError
-from acu_daemon.model import FitResult, Pass
+from acu_daemon.model import FitResult, Model, Pass
 from acu_daemon.orbit.timescales import utc_text
 
 VERSION = 1
@@ -42,6 +43,12 @@ class RunState:
     held: bool | None = None  # the daemon held the antenna, with this fault bit; None: it did not
     is_stow_kept: bool = False  # only read: of a version that kept no file `stowed`
     fit: CarryOver | None = None
+    by_hand: ByHand = by_hand_before()
+    elements: str = ""  # in force then: a nudge is of them alone
+
+    def by_hand_with(self, elements: str) -> ByHand:
+        """What of a person's hand holds with the elements that are in force now."""
+        return self.by_hand if elements == self.elements else replace(self.by_hand, nudge=None)
 
     def is_of(self, satellite: str, coming: Pass, clock_s: float | None) -> bool:
         """Whether this is the same pass of the same satellite, and of the same rehearsal."""
@@ -102,12 +109,12 @@ class RunStateKeeper:
     def see(self, state: ControlState) -> None:
         """Take the memory of a tick; it is written where it differs."""
         held = None if state.foreign_stop.held is None else state.foreign_stop.held.has_interlock_fault
-        seen, last = (str(state.tracking.track), state.arming.by_people, held), self._state
+        seen, last = (str(state.tracking.track), state.arming.by_people, held, state.by_hand), self._state
         self._tick_count += 1
         is_retried = bool(self.problem) and self._tick_count % RETRY_TICKS == 0
-        if seen != (last.track, last.arming, last.held) or is_retried:
-            track, arming, held = seen
-            self._state = replace(last, track=track, arming=arming, held=held)
+        if seen != (last.track, last.arming, last.held, last.by_hand) or is_retried:
+            track, arming, held, by_hand = seen
+            self._state = replace(last, track=track, arming=arming, held=held, by_hand=by_hand)
             self._latest.offer((self._state, self._fit))
 
     def _save(self, newest: tuple[RunState, FitResult | None]) -> None:
@@ -139,6 +146,8 @@ def _to_json(state: RunState) -> dict[str, Any]:
         "state": state.track,
         "arming": state.arming,
         "held": state.held,
+        "by_hand": by_hand_json(state.by_hand),
+        "elements": state.elements,
         "fit": None if state.fit is None else to_json(state.satellite, state.fit),
     }
 
@@ -159,7 +168,29 @@ def _from_json(read: Any) -> RunState:
         held=_flag(read, "held"),
         is_stow_kept=bool(_flag(read, "is_stow_kept")),
         fit=None if read["fit"] is None else replace(from_json(read["fit"], satellite), is_of_this_pass=True),
+        by_hand=by_hand_of(read.get("by_hand")),
+        elements=_text(read.get("elements", "")),
     )
+
+
+def by_hand_json(by_hand: ByHand) -> dict[str, Any]:
+    """What a person changed of a pass, as JSON."""
+    nudge, told = by_hand.nudge, None
+    if nudge is not None:
+        model = None if nudge.model is None else str(nudge.model)
+        told = {"along_s": nudge.along_s, "across_deg": nudge.across_deg, "model": model}
+    return {"is_held": by_hand.is_held, "nudge": told}
+
+
+def by_hand_of(read: Any) -> ByHand:
+    """The same, read; None: of a version that kept none.  Raises: ValueError, TypeError, KeyError: what is wrong."""
+    if read is None:
+        return by_hand_before()
+    told, nudge = read["nudge"], None
+    if told is not None:
+        model = None if told["model"] is None else Model(told["model"])
+        nudge = Nudge(number(told["along_s"]), number(told["across_deg"]), model)
+    return by_hand_before(is_held=bool(_flag(read, "is_held")), nudge=nudge)
 
 
 def _flag(read: dict[str, Any], name: str) -> bool | None:

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.orders import Event
-from acu_daemon.control.state import ControlState, Nudge
+from acu_daemon.control.state import ByHand, ControlState, Nudge
 from acu_daemon.control.tick_input import HoldWish, NudgeWish, Sky, TickInput
 from acu_daemon.control.tracking.causes import path_point
 from acu_daemon.control.tracking.path_offset import learned_offset
@@ -51,6 +51,11 @@ def _of_model(state: ControlState, sky: Sky, events: list[Event]) -> ControlStat
     fields = {"along_s": nudge.along_s, "across_deg": nudge.across_deg, "path": str(prediction.model)}
     events.append(Event("nudge.ends", fields))
     return with_parts(state, by_hand=replace(state.by_hand, nudge=None))
+
+
+def by_hand_before(*, is_held: bool = False, nudge: Nudge | None = None) -> ByHand:
+    """What a person had changed of the pass before the daemon was started again in it."""
+    return ByHand(is_held, nudge)
 
 
 def nudge_in_force(state: ControlState) -> Nudge | None:
