@@ -45,75 +45,20 @@ def take_snapshot(
     files_alarm: str,
 ) -> Snapshot:
     """What there is to see now."""
-    seen = _seen(area, foreground, port, control, now_tai_s, is_rehearsal=is_rehearsal, files_alarm=files_alarm)
-    state, coming = area.state, subject.coming
-    off, late_s, half_beam_deg = off_path(state, area.sky), seen.along_s or 0.0, control.beamwidth_deg / 2
-    around = look_around(state, now_tai_s, control)
-    is_behind = not seen.is_acquired and is_hidden(area.sky, now_tai_s, control)
-    until_tai_s = hidden_until_tai_s(area.sky, now_tai_s) if is_behind else None
-    seen = replace(
-        seen,
-        sun_deg=around.sun_deg,
-        sun_reach_s=around.sun_reach_s,
-        way_out_az_deg=around.way_out[0] if around.way_out else None,
-        way_out_el_deg=around.way_out[1] if around.way_out else None,
-        envelope_alarm=around.alarm,
-        is_hidden=is_behind,
-        hidden_s=None if until_tai_s is None else until_tai_s - now_tai_s,
-        slaved_by=state.slaved.wish.by if state.slaved.wish else "",
-        slaved_s=state.slaved.until_tai_s - now_tai_s if state.slaved.wish else None,
-        **_receiver(state, now_tai_s, control),
-        utc=utc_text(now_tai_s, 1),
-        satellite=subject.satellite,
-        station=subject.station,
-        acu=subject.acu,
-        elements=subject.elements,
-        elements_problem=subject.elements_problem,
-        next_passes=subject.next_passes,
-        wind=subject.facts.wind,
-        phantom=subject.facts.phantom,
-        paused_until_utc=subject.facts.paused_until_utc,
-        state_s=now_tai_s - state.tracking.entered_tai_s if isfinite(state.tracking.entered_tai_s) else None,
-        half_beam_deg=half_beam_deg,
-        off_path_deg=off.off_deg if off else None,
-        is_on_path=off.off_deg <= half_beam_deg if off else None,
-        path=off.made_from if off else "",
-        speed_deg_s=foreground.motion.speed_deg_s(now_tai_s),
-        acu_mode=state.intake.status.mode.name if state.intake.status else "",
-        acu_faults=foreground.acu_faults if state.tracking.track is TrackState.FAULT else "",
-        is_stopping=state.arming.is_stop_due,
-        stop_sent_utc=_utc(foreground.stop_times.sent_tai_s),
-        stop_confirmed_utc=_utc(foreground.stop_times.confirmed_tai_s),
-        rise_utc=utc_text(coming.rise_tai_s, 0) if coming else "",
-        set_utc=utc_text(coming.set_tai_s + late_s, 0) if coming else "",
-        rise_in_s=coming.rise_tai_s - now_tai_s if coming else None,
-        set_in_s=coming.set_tai_s + late_s - now_tai_s if coming else None,
-        culmination_deg=coming.culmination_el_deg if coming else None,
-        zenith=_zenith(area.sky, now_tai_s),
-        tilt=_tilt(state, control),
-        tilt_alarm=_tilt_alarm(state, area.sky, now_tai_s, control),
-    )
-    return replace(seen, verdict=verdict(seen).word)
-
-
-def _seen(
-    area: CommonArea,
-    foreground: Foreground,
-    port: AcuPort,
-    control: ControlConfig,
-    now_tai_s: float,
-    *,
-    is_rehearsal: bool,
-    files_alarm: str,
-) -> Snapshot:
-    """All but what the run is about and where the antenna points."""
-    state, sky = area.state, area.sky
+    state, sky, coming = area.state, area.sky, subject.coming
     status, reading, prediction = state.intake.status, state.intake.reading, sky.prediction
+    track = state.tracking.track
     lag_az_s, lag_el_s = state.lag_s(control)
     identity, lateness = foreground.identity, foreground.lateness.figures(LATENESS_TICKS)
-    return Snapshot(
+    off, half_beam_deg = off_path(state, sky), control.beamwidth_deg / 2
+    late_s = sky.fit.along_s if sky.fit else 0.0
+    around = look_around(state, now_tai_s, control)
+    is_acquired = track is not TrackState.LINK_LOST and _is_acquired(state, now_tai_s, control)
+    is_behind = not is_acquired and is_hidden(sky, now_tai_s, control)
+    until_tai_s = hidden_until_tai_s(sky, now_tai_s) if is_behind else None
+    seen = Snapshot(
         tai_s=now_tai_s,
-        state=str(state.tracking.track),
+        state=str(track),
         az_deg=status.az_deg if status else None,
         el_deg=status.el_deg if status else None,
         reading_age_s=now_tai_s - reading.tai_s if reading else None,
@@ -122,13 +67,13 @@ def _seen(
         agc_db=status.agc_db if status else None,
         search=covered_text(state.search.scan, prediction, control) if state.search.scan.rows else "",
         false_lock_count=state.false_lock.count,
-        is_acquired=state.tracking.track is not TrackState.LINK_LOST and _is_acquired(state, now_tai_s, control),
-        miss_deg=None if state.tracking.track is TrackState.LINK_LOST else _miss_deg(reading, prediction),
+        is_acquired=is_acquired,
+        miss_deg=None if track is TrackState.LINK_LOST else _miss_deg(reading, prediction),
         along_s=sky.fit.along_s if sky.fit else None,
         across_deg=sky.fit.across_deg if sky.fit else None,
         fit_age_s=now_tai_s - sky.fit.at_tai_s if sky.fit else None,
         sigma_deg=_sigma_deg(prediction, now_tai_s),
-        inside_s=prediction.seconds_inside(now_tai_s, control.beamwidth_deg / 2) if prediction else None,
+        inside_s=prediction.seconds_inside(now_tai_s, half_beam_deg) if prediction else None,
         buffer_s=max(0.0, prediction.end_tai_s - now_tai_s) if prediction else 0.0,
         buffer_kind=prediction.kind if prediction else "",
         lag_az_s=lag_az_s,
@@ -163,9 +108,49 @@ def _seen(
         is_rehearsal=is_rehearsal,
         is_simulation=identity is not None and identity.is_simulated,
         model=str(area.model or ""),
-        rejecting=area.gate.rejecting if state.tracking.track in AUTOTRACKING else "",
+        rejecting=area.gate.rejecting if track in AUTOTRACKING else "",
         rejected_counts=area.rejected_counts,
+        sun_deg=around.sun_deg,
+        sun_reach_s=around.sun_reach_s,
+        way_out_az_deg=around.way_out[0] if around.way_out else None,
+        way_out_el_deg=around.way_out[1] if around.way_out else None,
+        envelope_alarm=around.alarm,
+        is_hidden=is_behind,
+        hidden_s=None if until_tai_s is None else until_tai_s - now_tai_s,
+        slaved_by=state.slaved.wish.by if state.slaved.wish else "",
+        slaved_s=state.slaved.until_tai_s - now_tai_s if state.slaved.wish else None,
+        **_receiver(state, now_tai_s, control),
+        utc=utc_text(now_tai_s, 1),
+        satellite=subject.satellite,
+        station=subject.station,
+        acu=subject.acu,
+        elements=subject.elements,
+        elements_problem=subject.elements_problem,
+        next_passes=subject.next_passes,
+        wind=subject.facts.wind,
+        phantom=subject.facts.phantom,
+        paused_until_utc=subject.facts.paused_until_utc,
+        state_s=now_tai_s - state.tracking.entered_tai_s if isfinite(state.tracking.entered_tai_s) else None,
+        half_beam_deg=half_beam_deg,
+        off_path_deg=off.off_deg if off else None,
+        is_on_path=off.off_deg <= half_beam_deg if off else None,
+        path=off.made_from if off else "",
+        speed_deg_s=foreground.motion.speed_deg_s(now_tai_s),
+        acu_mode=status.mode.name if status else "",
+        acu_faults=foreground.acu_faults if track is TrackState.FAULT else "",
+        is_stopping=state.arming.is_stop_due,
+        stop_sent_utc=_utc(foreground.stop_times.sent_tai_s),
+        stop_confirmed_utc=_utc(foreground.stop_times.confirmed_tai_s),
+        rise_utc=utc_text(coming.rise_tai_s, 0) if coming else "",
+        set_utc=utc_text(coming.set_tai_s + late_s, 0) if coming else "",
+        rise_in_s=coming.rise_tai_s - now_tai_s if coming else None,
+        set_in_s=coming.set_tai_s + late_s - now_tai_s if coming else None,
+        culmination_deg=coming.culmination_el_deg if coming else None,
+        zenith=_zenith(sky, now_tai_s),
+        tilt=_tilt(state, control),
+        tilt_alarm=_tilt_alarm(state, sky, now_tai_s, control),
     )
+    return replace(seen, verdict=verdict(seen).word)
 
 
 def _utc(tai_s: float | None) -> str:

@@ -48,16 +48,21 @@ class SimulatedAir:
     """Rays of a set of apparent elevations, the lowest first, the last to the zenith: made by `simulated_air`."""
 
     rays: tuple[_Ray, ...]
+    near_deg: tuple[float, ...]  # geometric elevations of the same rays at 1000 km: where a search begins
 
     def apparent_el_deg(self, geometric_el_deg: float, range_m: float) -> float:
         """Give the elevation at which a satellite appears, from that in a vacuum, 0.0001 deg.
 
         Below the lowest ray, which leaves horizontally, the refraction is that of the lowest ray.
         """
-        above = bisect_left(self.rays, geometric_el_deg, key=lambda ray: ray.geometric_deg(range_m))
-        if above == len(self.rays):  # the zenith
+        rays, above = self.rays, bisect_left(self.near_deg, geometric_el_deg)
+        while above > 0 and rays[above - 1].geometric_deg(range_m) >= geometric_el_deg:
+            above -= 1
+        while above < len(rays) and rays[above].geometric_deg(range_m) < geometric_el_deg:
+            above += 1
+        if above == len(rays):  # the zenith
             return geometric_el_deg
-        high, low = self.rays[above], self.rays[max(above - 1, 0)]
+        high, low = rays[above], rays[max(above - 1, 0)]
         high_deg, low_deg = high.geometric_deg(range_m), low.geometric_deg(range_m)
         high_up_deg, low_up_deg = high.apparent_deg - high_deg, low.apparent_deg - low_deg
         share = 0.0 if above == 0 else (geometric_el_deg - low_deg) / (high_deg - low_deg)
@@ -94,4 +99,5 @@ def simulated_air(
     x_m, y_m = radii_m[-1] * np.sin(central), radii_m[-1] * np.cos(central) - radii_m[0]
     out_rad = np.arccos(invariant / radii_m[-1]) - central
     columns = (_APPARENT_DEG, x_m, y_m, np.cos(out_rad), np.sin(out_rad))
-    return SimulatedAir(tuple(_Ray(*ray) for ray in zip(*(one.tolist() for one in columns), strict=True)))
+    rays = tuple(_Ray(*ray) for ray in zip(*(one.tolist() for one in columns), strict=True))
+    return SimulatedAir(rays, tuple(ray.geometric_deg(1e6) for ray in rays))
