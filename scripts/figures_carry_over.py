@@ -26,7 +26,8 @@ from tables.seed_001 import sky_angles_deg
 from tables.skies import Sky, readings_of, real_elements, real_sky
 from tables.workers import run_script
 
-from acu_daemon.assist.estimators.full.carry_over import CarryOver, aged_prior, carry_over_of, first_fit, why_not
+from acu_daemon.assist.estimators.full.aged_prior import aged_prior, first_fit
+from acu_daemon.assist.estimators.full.carry_over import CarryOver, carry_over_of, why_not
 from acu_daemon.assist.estimators.full.estimated_states import ORBIT, STATE_COUNT
 from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
 from acu_daemon.assist.mount_model import encoder_look, sigma_deg

@@ -15,17 +15,10 @@ from real_passes import noisy, sky_angles_deg
 from script_modules import load
 
 from acu_daemon.assist.estimators.estimator import ESTIMATORS, has_covariance
-from acu_daemon.assist.estimators.full.carry_over import (
-    LONGEST_S,
-    CarryOver,
-    aged_prior,
-    carry_over_of,
-    first_fit,
-    why_not,
-    why_not_resume,
-)
+from acu_daemon.assist.estimators.full.aged_prior import aged_prior, first_fit
+from acu_daemon.assist.estimators.full.carry_over import LONGEST_S, CarryOver, carry_over_of, why_not, why_not_resume
 from acu_daemon.assist.estimators.full.carry_over_test import CarryOverTest
-from acu_daemon.assist.estimators.full.estimated_states import BIAS, ORBIT, Prior, make_prior
+from acu_daemon.assist.estimators.full.estimated_states import BIAS, ORBIT, Prior, correction_of, make_prior
 from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
 from acu_daemon.assist.estimators.full.normal_points import sights
 from acu_daemon.assist.mount_model import encoder_look
@@ -243,6 +236,23 @@ def test_a_widened_fit_is_gone_on_from_in_its_own_pass_only() -> None:
     far, at = replace(CARRIED, correction=Correction(delta_mean_anomaly_rad=6.0 * DEG)), CARRIED.at_tai_s
     assert why_not(far, SOURCE, SETTINGS, at) == "its correction is more than 5 sigma from the elements"
     assert why_not_resume(far, SOURCE, WHERE, "full", SETTINGS, at, has_covariance=True) == ""
+
+
+@pytest.mark.parametrize("state", range(6))
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_what_the_widest_prior_leaves_within_five_sigmas_is_gone_on_from_and_what_is_farther_is_not(
+    state: int, side: float
+) -> None:
+    """25 times the elements' own sigma, and along the track 5 deg beside it (docs/estimation.md, Prior inflation)."""
+    at, x = CARRIED.at_tai_s, np.zeros(17)
+    own = float(np.sqrt(make_prior(SOURCE, SETTINGS, at).covariance[state, state]))
+    limit = 5.0 * np.hypot(25.0 * own, 5.0 * DEG if state == 1 else 0.0)
+    for share, is_gone_on in ((0.99, True), (1.01, False)):
+        x[state] = side * share * limit
+        said = why_not_resume(
+            replace(CARRIED, correction=correction_of(x)), SOURCE, WHERE, "full", SETTINGS, at, has_covariance=True
+        )
+        assert (said == "") == is_gone_on
 
 
 def test_what_the_configuration_holds_fixed_is_not_judged() -> None:

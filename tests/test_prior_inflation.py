@@ -1,5 +1,7 @@
 """Elements far worse than their sigmas: the fit finds the satellite all the same, says so, and is honest about it."""
 
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,8 +19,9 @@ from acu_daemon.assist.session.refit import RefitRequest, RefitSetup, Refitter
 from acu_daemon.assist.settings import BROUWER_SIGMAS, EPHEMERIS_SIGMAS, ElementSigmas, EstimatorSettings, StateSigmas
 from acu_daemon.model import AngleBias, AxisLimits, Correction, FitResult, Readings
 from acu_daemon.orbit.look import look_at
-from acu_daemon.units import DAY_S
+from acu_daemon.units import DAY_S, DEG
 
+DOCS = Path(__file__).resolve().parents[1] / "docs" / "estimation.md"
 SIGMA_DEG = 0.03
 GIVEN = EstimatorSettings(SIGMA_DEG, SIGMA_DEG, orbit_sigmas=StateSigmas(3e3, 3.0))
 SOURCE, WHERE = circular(66.0, 0.001), site(4.0)
@@ -62,6 +65,22 @@ def test_elements_sixteen_sigmas_off_are_recovered_with_a_note(km: float, count:
     narrow.add(first(readings, count))
     off, sigma = off_and_sigma_deg(narrow.fit(), km, readings.tai_s)
     assert (off > 4.0 * sigma).any()
+
+
+def test_the_widths_that_are_tried_are_those_of_the_documentation() -> None:
+    lines = DOCS.read_text().split("### Prior inflation")[1].split("```")[0].splitlines()
+    rows = [
+        [float("".join(re.findall(r"[\d.]", cell)) or 0.0) for cell in line.split("|")[2:4]]
+        for line in lines
+        if "x" in line and line.startswith("|")
+    ]
+    assert len(rows) == len(WIDTHS)
+    given = make_prior(SOURCE, GIVEN, SOURCE.epoch_tai_s).covariance
+    sigma = np.sqrt(np.diag(given))
+    for width, (along_deg, factor) in zip(WIDTHS, rows, strict=True):
+        expected = sigma * np.where(np.arange(sigma.size) < 6, factor, 1.0)
+        expected[1] = np.hypot(expected[1], along_deg * DEG)
+        assert np.sqrt(np.diag(width.covariance(given))) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("bias", [AngleBias(), AngleBias(az_deg=0.15, el_deg=-0.12)])

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from acu_daemon.assist.estimators.full.carry_over import CarryOver, aged_prior, why_not, why_other_frame
+from acu_daemon.assist.estimators.full.aged_prior import aged_prior
+from acu_daemon.assist.estimators.full.carry_over import CarryOver, why_not, why_other_frame
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.config.elements_tables import ElementsSourcesSection
 from acu_daemon.config.satellite_tables import BrouwerSection, SatelliteFile

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from acu_daemon.assist.estimators.estimator import Estimator, EstimatorSettings, has_covariance, make_estimator
-from acu_daemon.assist.estimators.full.carry_over import CarryOver, aged_prior, first_fit
+from acu_daemon.assist.estimators.full.aged_prior import aged_prior, first_fit
+from acu_daemon.assist.estimators.full.carry_over import CarryOver
 from acu_daemon.assist.estimators.full.full_estimator import FullEstimator, shift_for_people
 from acu_daemon.assist.estimators.full.pedestal_prior import PedestalPrior
 from acu_daemon.assist.mount_memory.pedestal_memory import PedestalMemory, prior_of

@@ -5,7 +5,8 @@ from dataclasses import fields, replace
 import numpy as np
 
 from acu_daemon.assist.estimators.estimator_base import BaseEstimator, on_the_sky_deg, right_of_track
-from acu_daemon.assist.estimators.full.carry_over import CarryOver, aged_prior
+from acu_daemon.assist.estimators.full.aged_prior import aged_prior
+from acu_daemon.assist.estimators.full.carry_over import CarryOver
 from acu_daemon.assist.estimators.full.carry_over_test import REJECTED_S, WIDEST_SIGMAS, CarryOverTest
 from acu_daemon.assist.estimators.full.elements_discrepancy import describe_discrepancy
 from acu_daemon.assist.estimators.full.estimated_states import Prior, bias_of, correction_of, make_prior, shift_of

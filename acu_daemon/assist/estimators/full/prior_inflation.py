@@ -30,11 +30,15 @@ class Width:
         """The batch with an orbit that is worth less; itself where it is not, with what it has computed."""
         if self == WIDTHS[0]:
             return batch
-        covariance = batch.prior.covariance.copy()
+        return replace(batch, prior=replace(batch.prior, covariance=self.covariance(batch.prior.covariance)))
+
+    def covariance(self, given: Array) -> Array:
+        """The covariance (17, 17) of a prior with this width."""
+        covariance = given.copy()
         covariance[ORBIT] *= self.factor
         covariance[:, ORBIT] *= self.factor
         covariance[_MEAN_ANOMALY, _MEAN_ANOMALY] += (self.along_deg * DEG) ** 2
-        return replace(batch, prior=replace(batch.prior, covariance=covariance))
+        return covariance
 
 
 WIDTHS = (Width(), Width(1.0), Width(1.0, 5.0), Width(5.0, 25.0))
