@@ -4,6 +4,7 @@
     .venv/bin/python scripts/screening_ablation.py                   the table (an hour of one core)
     .venv/bin/python scripts/screening_ablation.py --check strain    the checks with that word in their name
     .venv/bin/python scripts/screening_ablation.py --case hunting    the cases with that word in their name
+    .venv/bin/python scripts/screening_ablation.py --place 2 3 4 5   other passes, real and made
 
 Bad minutes are those of gate_figures.py.  First locks are a minute of something else before 20 s of the satellite.
 Good readings are the satellite's own all the time: elements that are off, noise that grows or goes on for seconds, a
@@ -154,9 +155,9 @@ class Figures:
 
 @cache
 def place_of(number: int) -> Place:
-    """A real pass, or one made."""
-    if number == 0:
-        return Place.of(PASSES[0])
+    """Even: a real pass of those there are; odd: one made."""
+    if number % 2 == 0:
+        return Place.of(PASSES[number // 2 % len(PASSES)])
     drawn = listed_passes(accurate, 40, np.random.default_rng(7))
     long = [one for one in drawn if one[1].tai_s[-1] - one[1].tai_s[0] > LONG_S]
     source, sky = long[number]
@@ -308,15 +309,20 @@ def row(check: str, found: list[Figures]) -> str:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--check", default="", metavar="WORD", help="the checks with that word in their name")
+    parser.add_argument(
+        "--check", default=[""], nargs="+", metavar="WORD", help="the checks with such a word in their name"
+    )
     parser.add_argument("--case", default="", metavar="WORD", help="the cases with that word in their name")
     parser.add_argument("--hz", type=float, nargs="+", default=[2.0], metavar="HZ", help="readings a second")
+    parser.add_argument(
+        "--place", type=int, nargs="+", default=[0, 1], metavar="N", help="even: real passes; odd: made"
+    )
     asked = parser.parse_args()
-    checks = tuple(dict.fromkeys([ALL_ON, *(one for one in CHECKS if asked.check in one)]))
+    checks = tuple(dict.fromkeys([ALL_ON, *(one for one in CHECKS if any(word in one for word in asked.check))]))
     jobs = [
         (number, hz, name, checks)
         for hz in asked.hz
-        for number in (0, 1)
+        for number in asked.place
         for name in cases_of(number, hz)
         if asked.case in name
     ]
