@@ -4,15 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from made_orbits import circular
-from made_pedestals import CROOKED, HERE, NOISE_DEG, SETTINGS, SQUARE, estimate_of, passes, read, remembered
+from made_pedestals import CROOKED, HERE, NOISE_DEG, SETTINGS, SQUARE, MadePass, estimate_of, passes, read, remembered
 from real_passes import sky_angles_deg
 
 from acu_daemon.assist.estimators.estimator import make_estimator
 from acu_daemon.assist.estimators.full.full_estimator import TRUSTED_AGAIN, FullEstimator
 from acu_daemon.assist.estimators.full.noise_correlation import WHITE, NoiseCorrelation, noise_correlation
 from acu_daemon.assist.estimators.full.normal_points import Points
-from acu_daemon.assist.estimators.full.pedestal_prior import PEDESTAL, Doubt, PedestalPrior, doubt_of
+from acu_daemon.assist.estimators.full.pedestal_prior import IA, IE, PEDESTAL, Doubt, PedestalPrior, doubt_of
+from acu_daemon.assist.mount_memory.day_and_night import STATE_COUNT, at_time_of_day, before_any_pass, swing_of
 from acu_daemon.assist.mount_memory.mount_fit import RecordedPass, fit_mount, supported
 from acu_daemon.assist.mount_memory.pedestal_memory import (
     PedestalMemory,
@@ -22,7 +25,7 @@ from acu_daemon.assist.mount_memory.pedestal_memory import (
     first_memory,
     prior_of,
 )
-from acu_daemon.assist.mount_memory.update import fused, updated
+from acu_daemon.assist.mount_memory.update import Updated, fused, updated
 from acu_daemon.assist.mount_model import encoder_look
 from acu_daemon.assist.session.refit import RefitReply, RefitRequest, RefitSetup, Refitter
 from acu_daemon.model import AxisLimits, Model, Readings
@@ -31,6 +34,7 @@ from acu_daemon.units import DAY_S, DEG
 TRUTH_DEG = np.array([0.08, 0.02, -0.06, 0.0, -0.015, 0.02, -0.025, 0.015])  # of CROOKED: IA CA IE RF NPAE AN AW TF
 AZIMUTH = AxisLimits(-270.0, 270.0, 20.0, 10.0)
 LAST = 8
+SWUNG = 10
 
 
 @pytest.fixture(scope="module")
@@ -56,17 +60,18 @@ def worst_deg(prior: PedestalPrior | None, name: str = "full", used_s: float = 6
 
 
 def test_the_terms_of_a_crooked_mount_are_found_within_their_sigmas_and_predict(crooked: PedestalMemory) -> None:
-    sigma = np.sqrt(np.diag(crooked.mount.covariance)) / DEG
+    found = crooked.mount.terms
+    sigma = np.sqrt(np.diag(found.covariance)) / DEG
     is_open = sigma > 0.0
-    off = (crooked.mount.mean / DEG - TRUTH_DEG)[is_open] / sigma[is_open]
+    off = (found.mean / DEG - TRUTH_DEG)[is_open] / sigma[is_open]
     assert crooked.has_mount
     assert np.abs(off).max() < 3.0
     assert sigma[[5, 6]].max() < 0.006  # AN, AW
-    assert np.abs(crooked.mount.mean / DEG - TRUTH_DEG)[[0, 2]].max() < 0.03
+    assert np.abs(found.mean / DEG - TRUTH_DEG)[[0, 2]].max() < 0.03
     told = dict(
         zip(
             ("IA", "CA", "IE", "RF", "NPAE", "AN", "AW", "TF"),
-            supported(crooked.mount, a_priori_sigmas(SETTINGS)[1]),
+            supported(found, a_priori_sigmas(SETTINGS)[1]),
             strict=True,
         )
     )
@@ -122,13 +127,13 @@ def test_what_a_survey_gave_is_held_to_its_sigma_in_both_memories() -> None:
 
 
 def test_zero_points_walk_5_thousandths_in_a_day_and_never_beyond_what_was_known_before() -> None:
-    known = Remembered(np.zeros(8), np.zeros((8, 8)))
+    known = Remembered(np.zeros(STATE_COUNT), np.zeros((STATE_COUNT, STATE_COUNT)))
     memory = PedestalMemory(0.0, 5, known, known)
     day = np.sqrt(np.diag(aged(memory, SETTINGS, DAY_S).mount.covariance)) / DEG
-    assert day == pytest.approx([0.005, 0.0005, 0.005, 0.0, 0.0005, 0.002, 0.002, 0.0005])
+    assert day == pytest.approx([0.005, 0.0005, 0.005, 0.0, 0.0005, 0.002, 0.002, 0.0005, *[0.002] * 4])
     four = np.sqrt(np.diag(aged(memory, SETTINGS, 4.0 * DAY_S).mount.covariance)) / DEG
     assert four == pytest.approx(2.0 * day)
-    ages = np.sqrt(np.diag(aged(memory, SETTINGS, 1e6 * DAY_S).mount.covariance))
+    ages = np.sqrt(np.diag(aged(memory, SETTINGS, 1e6 * DAY_S).mount.at(0.0).covariance))
     assert (ages <= a_priori_sigmas(SETTINGS)[1] * (1.0 + 1e-9)).all()
 
 
@@ -137,9 +142,80 @@ def test_a_pass_is_fused_as_a_state_that_persists_and_one_of_its_own() -> None:
     persistent = Remembered(np.array([2.0]), np.array([[4.0]]))
     of_readings, prior = 7.0, 5.0
     posterior = Remembered(np.array([2.0 + prior / 10.0 * (of_readings - 2.0)]), np.array([[prior * 5.0 / 10.0]]))
-    after = fused(persistent, np.array([[prior]]), posterior)
+    after = fused(persistent, np.eye(1), np.array([[prior]]), posterior)
     assert after.mean[0] == pytest.approx(2.0 + 4.0 / 10.0 * (of_readings - 2.0))
     assert after.covariance[0, 0] == pytest.approx(4.0 - 16.0 / 10.0)
+
+
+@given(st.integers(0, 10_000), st.floats(0.0, DAY_S))
+def test_a_pass_at_any_time_of_the_day_is_fused_as_if_its_readings_were_of_the_states_themselves(
+    seed: int, tai_s: float
+) -> None:
+    """The pass is told its terms alone; what it says of mean, day and night is what a filter of all states says."""
+    rng = np.random.default_rng(seed)
+    root, looks = rng.standard_normal((STATE_COUNT, STATE_COUNT)), rng.standard_normal((20, 8))
+    known = Remembered(rng.standard_normal(STATE_COUNT), root @ root.T + np.eye(STATE_COUNT))
+    h, own = at_time_of_day(tai_s), np.diag(rng.uniform(0.1, 2.0, 8))
+    prior, mean = h @ known.covariance @ h.T + own, h @ known.mean
+    readings = looks @ mean + rng.standard_normal(20)
+    covariance = np.linalg.inv(np.linalg.inv(prior) + looks.T @ looks)
+    estimate = Remembered(mean + covariance @ looks.T @ (readings - looks @ mean), covariance)
+    after = fused(known, h, prior, estimate)
+    seen = looks @ h
+    gain = known.covariance @ seen.T @ np.linalg.inv(looks @ prior @ looks.T + np.eye(20))
+    assert after.mean == pytest.approx(known.mean + gain @ (readings - seen @ known.mean), rel=1e-6, abs=1e-6)
+    assert after.covariance == pytest.approx(known.covariance - gain @ seen @ known.covariance, rel=1e-6, abs=1e-6)
+
+
+# Day and night
+
+
+def swung(one: MadePass, seed: int, swing_deg: float, peak: float) -> Readings:
+    """A pass read while the zero points are off by day and night; peak: share of the day at which they are highest."""
+    readings = read(one, seed)
+    off_deg = swing_deg * np.cos(2.0 * np.pi * (readings.tai_s % DAY_S / DAY_S - peak))
+    return Readings(readings.tai_s, readings.az_deg + off_deg, readings.el_deg + off_deg)
+
+
+def after_swings(swing_deg: float, peak: float) -> tuple[PedestalMemory, list[Updated]]:
+    memory, told = first_memory(SETTINGS, circular().epoch_tai_s), []
+    for seed, one in enumerate(passes(CROOKED, SWUNG)):
+        told.append(updated(memory, estimate_of(one, swung(one, seed, swing_deg, peak), memory), SETTINGS))
+        memory = told[-1].memory
+    return memory, told
+
+
+@pytest.mark.parametrize("swing_deg, peak", [(0.02, 0.1), (0.03, 0.6), (0.0, 0.0)])
+def test_what_sun_and_night_do_to_the_zero_points_is_learnt_and_predicted_for_any_time_of_the_day(
+    swing_deg: float, peak: float
+) -> None:
+    memory, told = after_swings(swing_deg, peak)
+    assert [one.why_not for one in told] == [""] * SWUNG
+    assert not [one for one in told if one.shift_deg is not None]
+    off_deg, sigma_deg = [], []
+    for share in np.arange(0.0, 1.0, 0.125):
+        now = prior_of(memory, SETTINGS, memory.at_tai_s + share * DAY_S)
+        assert now is not None
+        swing = swing_deg * np.cos(2.0 * np.pi * ((memory.at_tai_s / DAY_S + share) % 1.0 - peak))
+        off_deg.append(now.mean[[0, 2]] / DEG - TRUTH_DEG[[0, 2]] - swing)
+        sigma_deg.append(np.sqrt(np.diag(now.covariance)[[0, 2]]) / DEG)
+    assert np.max(np.abs(off_deg) / sigma_deg) < 3.0
+    assert np.ptp(off_deg, axis=0).max() < max(
+        0.012, 0.7 * swing_deg
+    )  # a third of it is left, of what goes up and down
+    assert [swing_of(memory.mount.mean, term)[0] / DEG for term in (IA, IE)] == pytest.approx([swing_deg] * 2, abs=0.01)
+
+
+def test_a_zero_point_swings_no_farther_than_what_was_known_of_it_before_any_pass() -> None:
+    sigma = a_priori_sigmas(replace(SETTINGS, bias_sigma_azimuth_deg=0.004, bias_sigma_elevation_deg=0.0))[1]
+    variance = before_any_pass(sigma)
+    assert (variance >= 0.0).all()
+    assert not variance[10:].any()  # an elevation that is known has no day and night
+    seen = first_memory(SETTINGS, 0.0).mount
+    for tai_s in np.arange(0.0, DAY_S, 7000.0):
+        h = at_time_of_day(float(tai_s))
+        assert np.sqrt(np.diag(h @ np.diag(variance) @ h.T)) == pytest.approx(sigma)
+        assert np.sqrt(np.diag(seen.at(float(tai_s)).covariance)) == pytest.approx(a_priori_sigmas(SETTINGS)[1])
 
 
 # Noise that goes on

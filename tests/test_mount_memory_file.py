@@ -17,6 +17,7 @@ from made_pedestals import CROOKED, HERE, SETTINGS, estimate_of, passes, read, r
 from structlog.testing import capture_logs
 
 import acu_daemon.cli as cli
+from acu_daemon.assist.mount_memory.pedestal_memory import aged, first_memory
 from acu_daemon.assist.mount_memory.update import updated
 from acu_daemon.cli.options import antenna_of
 from acu_daemon.config.load import load_station
@@ -75,6 +76,28 @@ def test_what_is_written_is_read_again(tmp_path: Path, kept: MountFile) -> None:
     assert again.rows == (ROW,)
 
 
+def test_a_file_from_before_day_and_night_were_kept_is_taken_over_with_none_known(
+    tmp_path: Path, kept: MountFile
+) -> None:
+    said = json.loads(json.dumps(to_json(kept)))
+    said["version"] = 1
+    del said["day_and_night"]
+    for name in ("const", "mount"):
+        old = said["memory"][name]
+        old["mean_deg"] = old["mean_deg"][:8]
+        old["covariance_deg2"] = [row[:8] for row in old["covariance_deg2"][:8]]
+    (tmp_path / MOUNT).write_text(json.dumps(said))
+    with capture_logs() as logs:
+        again = read_mount_file(tmp_path / MOUNT, THIS)
+    assert logs == []
+    assert again is not None
+    assert again.memory.mount.terms.mean == pytest.approx(kept.memory.mount.terms.mean, rel=1e-12)
+    assert again.memory.mount.terms.covariance == pytest.approx(kept.memory.mount.terms.covariance, rel=1e-12)
+    assert not again.memory.mount.mean[8:].any()
+    later = aged(again.memory, SETTINGS, again.memory.at_tai_s)
+    assert (later.mount.covariance[8:, 8:] == first_memory(SETTINGS, 0.0).mount.covariance[8:, 8:]).all()
+
+
 def test_no_file_is_no_complaint(tmp_path: Path) -> None:
     with capture_logs() as logs:
         assert read_mount_file(tmp_path / MOUNT, THIS) is None
@@ -121,7 +144,7 @@ def changes(*keys: str | int, value: Any) -> Callable[[Any], None]:
 @pytest.mark.parametrize(
     "change",
     [
-        changes("version", value=2),
+        changes("version", value=3),
         changes("terms", value=["IA"]),
         changes("memory", value=None),
         changes("memory", "passes", value=-1),

@@ -17,11 +17,12 @@ SETTINGS = estimator_settings(TARGET.station, TARGET.satellite)
 def memory_of(ia_deg: float, ie_deg: float) -> PedestalMemory:
     """After ten passes that showed these zero points, to 0.005 deg."""
     first = first_memory(SETTINGS, RISING_TAI_S - 6000.0)
-    mean = np.zeros(8)
+    mean = np.zeros_like(first.const.mean)
     mean[[0, 2]] = ia_deg * DEG, ie_deg * DEG
     known = []
     for one in (first.const, first.mount):
         covariance = one.covariance.copy()
+        covariance[8:, 8:] *= 0.1  # day and night
         covariance[0, 0] = covariance[2, 2] = (0.005 * DEG) ** 2
         known.append(Remembered(mean, covariance))
     return replace(first, pass_count=10, const=known[0], mount=known[1])

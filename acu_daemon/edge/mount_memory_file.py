@@ -18,6 +18,7 @@ import structlog
 
 from acu_daemon.assist.estimators.full.noise_correlation import NoiseCorrelation
 from acu_daemon.assist.estimators.full.pedestal_prior import IA, IE, PEDESTAL_TERMS, Doubt
+from acu_daemon.assist.mount_memory.day_and_night import STATE_COUNT, SWING_DEG, SWINGS
 from acu_daemon.assist.mount_memory.pedestal_memory import PedestalMemory, Remembered, first_memory
 from acu_daemon.assist.mount_memory.update import Updated, updated
 from acu_daemon.assist.mount_memory.whole_pass import PassEstimate
@@ -29,7 +30,7 @@ from acu_daemon.units import DEG, Array
 
 MOUNT = "mount.json"
 REHEARSAL = "-rehearsal"  # what the state directory of rehearsals ends in
-VERSION = 1
+VERSION = 2  # 1: without day and night
 MOST_ROWS = 500  # of the passes told, the newest
 MOST_DEG = 10.0  # of a term beyond [mount]: no encoder of a station that tracks is so far off
 _LARGEST_BYTES = 1_000_000
@@ -199,6 +200,7 @@ def to_json(kept: MountFile) -> dict[str, Any]:
         "pedestal": kept.pedestal,
         "utc": utc_text(memory.at_tai_s),
         "terms": list(PEDESTAL_TERMS),
+        "day_and_night": list(SWINGS),
         "memory": {
             "at_tai_s": memory.at_tai_s,
             "passes": memory.pass_count,
@@ -230,18 +232,18 @@ def to_json(kept: MountFile) -> dict[str, Any]:
 
 def from_json(read: Any) -> MountFile:
     """Raises: ValueError, TypeError, KeyError: what is wrong."""
-    if not isinstance(read, dict) or read.get("version") != VERSION:
+    if not isinstance(read, dict) or read.get("version") not in (1, VERSION):
         raise ValueError(f"expected a JSON object with version {VERSION}")
     if read["terms"] != list(PEDESTAL_TERMS):
         raise ValueError(f"expected the terms {', '.join(PEDESTAL_TERMS)}")
-    memory, newest = read["memory"], read["newest"]
+    memory, newest, has_swings = read["memory"], read["newest"], read["version"] == VERSION
     return MountFile(
         pedestal=str(read["pedestal"]),
         memory=PedestalMemory(
             number(memory["at_tai_s"]),
             _count(memory["passes"]),
-            _terms(memory["const"]),
-            _terms(memory["mount"]),
+            _kept(memory["const"], has_swings=has_swings),
+            _kept(memory["mount"], has_swings=has_swings),
             number(memory["evidence"]),
             tuple(_doubt(one) for one in memory["doubts"]),
             _noise(memory["noise"]),
@@ -281,8 +283,18 @@ def _doubt_json(one: Doubt) -> dict[str, Any]:
     return {"gradient": one.gradient.tolist(), "information": one.information.tolist()}
 
 
-def _terms(read: Any) -> Remembered:
-    mean, covariance = numbers(read["mean_deg"], (_COUNT,)), numbers(read["covariance_deg2"], (_COUNT, _COUNT))
+def _kept(read: Any, *, has_swings: bool) -> Remembered:
+    if has_swings:
+        return _terms(read, STATE_COUNT)
+    found = _terms(read)
+    mean, variance = np.zeros(STATE_COUNT), np.full(STATE_COUNT, (SWING_DEG * DEG) ** 2)  # ageing bounds it
+    covariance = np.diag(variance)
+    mean[:_COUNT], covariance[:_COUNT, :_COUNT] = found.mean, found.covariance
+    return Remembered(mean, covariance)
+
+
+def _terms(read: Any, count: int = _COUNT) -> Remembered:
+    mean, covariance = numbers(read["mean_deg"], (count,)), numbers(read["covariance_deg2"], (count, count))
     _must_be_covariance(covariance)
     if max(float(np.max(np.abs(mean))), float(np.sqrt(np.max(covariance)))) > MOST_DEG:
         raise ValueError(f"mean_deg: expected terms within {MOST_DEG:g} deg")

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from acu_daemon.assist.estimators.full.pedestal_prior import PEDESTAL_TERMS
+from acu_daemon.assist.estimators.full.pedestal_prior import IA, IE, PEDESTAL_TERMS
+from acu_daemon.assist.mount_memory.day_and_night import swing_of
 from acu_daemon.assist.mount_memory.mount_fit import FittedPass, supported
 from acu_daemon.assist.mount_memory.pedestal_memory import PREFERRED, PedestalMemory, a_priori_sigmas
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.edge.mount_memory_file import PassRow
-from acu_daemon.units import DEG
+from acu_daemon.units import DEG, Array
 
 SHOWN_PASSES = 10
 KEYS = {"IA": "ia", "CA": "ca", "IE": "ie", "NPAE": "npae", "AN": "an", "AW": "aw", "TF": "tf"}  # of [mount]
@@ -20,7 +21,8 @@ KEYS = {"IA": "ia", "CA": "ca", "IE": "ie", "NPAE": "npae", "AN": "an", "AW": "a
 def terms_lines(memory: PedestalMemory, settings: EstimatorSettings) -> list[str]:
     """The terms of the memory that predicts, in deg, and which of them the data support."""
     sigma = a_priori_sigmas(settings)[int(memory.has_mount)]
-    known, now = memory.chosen, np.sqrt(np.diag(memory.chosen.covariance))
+    known = memory.chosen.terms
+    now = np.sqrt(np.diag(known.covariance))
     told = supported(known, sigma)
     which = "all terms predict" if memory.has_mount else "IA, CA, IE and RF predict"
     lines = [
@@ -33,7 +35,13 @@ def terms_lines(memory: PedestalMemory, settings: EstimatorSettings) -> list[str
             word = "told by the data" if told[k] else "hardly told by the data"
             lines.append(f"{name:5}{known.mean[k] / DEG:+9.4f}{now[k] / DEG:9.4f}{sigma[k] / DEG:9.4f}   {word}")
     lines.append("beyond [mount]; RF: what the refraction is off the one told, at 45 deg of elevation")
-    return lines
+    return lines + [_swing_line(memory.chosen.mean, term) for term in (IA, IE) if sigma[term] > 0.0]
+
+
+def _swing_line(mean: Array, term: int) -> str:
+    amplitude, share = swing_of(mean, term)
+    utc_h = (12.0 + 24.0 * share) % 24.0  # days of tai_s begin at noon
+    return f"{PEDESTAL_TERMS[term]} by day and night: +-{amplitude / DEG:.4f} deg, highest at {utc_h:.0f} h UTC"
 
 
 def pass_lines(rows: Sequence[PassRow]) -> list[str]:
@@ -51,11 +59,12 @@ def toml_lines(memory: PedestalMemory, settings: EstimatorSettings, given_deg: M
     given_deg: the terms of [mount] now, by their keys.
     """
     sigma = a_priori_sigmas(settings)[int(memory.has_mount)]
-    now, told = np.sqrt(np.diag(memory.chosen.covariance)), supported(memory.chosen, sigma)
+    known = memory.chosen.terms
+    now, told = np.sqrt(np.diag(known.covariance)), supported(known, sigma)
     lines = ["[mount]"]
     for k, name in enumerate(PEDESTAL_TERMS):
         if name in KEYS and told[k]:
-            key, found_deg = f"{KEYS[name]}_deg", float(memory.chosen.mean[k]) / DEG
+            key, found_deg = f"{KEYS[name]}_deg", float(known.mean[k]) / DEG
             lines.append(f"{key} = {given_deg[key] + found_deg:.4f}")
             lines.append(f"{KEYS[name]}_sigma_deg = {now[k] / DEG:.4f}")
     return lines

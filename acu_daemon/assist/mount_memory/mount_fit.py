@@ -79,8 +79,8 @@ def sights_of(one: RecordedPass) -> Sights | None:
 
 
 def _fitted(one: RecordedPass, sights: Sights, why_not: str, memory: PedestalMemory) -> FittedPass:
-    zero = np.zeros_like(memory.chosen.mean)
-    before, after = (_left_deg(one, sights, mean) for mean in (zero, memory.chosen.mean))
+    found = memory.chosen.at(float(sights.tai_s[0])).mean
+    before, after = (_left_deg(one, sights, mean) for mean in (np.zeros_like(found), found))
     az_deg = np.arctan2(sights.sin_az, sights.cos_az) / DEG % 360.0
     return FittedPass(one.label, why_not, az_deg, np.arctan2(sights.sin_el, sights.cos_el) / DEG, before, after)
 

@@ -10,11 +10,11 @@ import numpy as np
 
 from acu_daemon.assist.estimators.full.estimated_states import MOUNT
 from acu_daemon.assist.estimators.full.noise_correlation import WHITE, NoiseCorrelation
-from acu_daemon.assist.estimators.full.pedestal_prior import IA, IE, PEDESTAL_TERMS, RF, Doubt, PedestalPrior
+from acu_daemon.assist.estimators.full.pedestal_prior import IA, IE, RF, Doubt, PedestalPrior
+from acu_daemon.assist.mount_memory.day_and_night import COUNT, at_time_of_day, before_any_pass, swing_walk
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.units import DAY_S, DEG, Array
 
-COUNT = len(PEDESTAL_TERMS)
 UNSURVEYED_SIGMA_DEG = 0.03  # of CA, NPAE, AN, AW, TF of a mount that nobody surveyed
 PREFERRED = 3.0  # so much likelier, in its logarithm, whole passes must be with the mount's terms
 LATEST_COUNT = 3  # of passes that are asked together whether an encoder was re-zeroed
@@ -26,10 +26,23 @@ _NOISE_PASSES = 4.0  # what is known of the noise is an average over about so ma
 
 @dataclass(frozen=True)
 class Remembered:
-    """Mean (8,), rad, and covariance (8, 8) of IA, CA, IE, RF, NPAE, AN, AW, TF; no variance: not estimated."""
+    """Mean (8,), rad, and covariance (8, 8) of IA, CA, IE, RF, NPAE, AN, AW, TF; no variance: not estimated.
+
+    Of a memory (12,) and (12, 12), with day and night.
+    """
 
     mean: Array
     covariance: Array = field(repr=False)
+
+    @property
+    def terms(self) -> "Remembered":
+        """The terms (8,) of a memory, over a day."""
+        return Remembered(self.mean[:COUNT], self.covariance[:COUNT, :COUNT])
+
+    def at(self, tai_s: float) -> "Remembered":
+        """The terms (8,) of a memory at a time of the day."""
+        h = at_time_of_day(tai_s)
+        return Remembered(h @ self.mean, h @ self.covariance @ h.T)
 
 
 @dataclass(frozen=True)
@@ -60,7 +73,8 @@ class PedestalMemory:
 
 def first_memory(settings: EstimatorSettings, at_tai_s: float) -> PedestalMemory:
     """What is known before any pass: the sigmas of the configuration."""
-    const, mount = (Remembered(np.zeros(COUNT), np.diag(one**2)) for one in a_priori_sigmas(settings))
+    variances = [before_any_pass(one) for one in a_priori_sigmas(settings)]
+    const, mount = (Remembered(np.zeros(one.size), np.diag(one)) for one in variances)
     return PedestalMemory(at_tai_s, 0, const, mount)
 
 
@@ -85,7 +99,7 @@ def aged(memory: PedestalMemory, settings: EstimatorSettings, at_tai_s: float) -
     """The memory at a time: what drifts is known less well, at worst as well as before any pass."""
     days = abs(at_tai_s - memory.at_tai_s) / DAY_S
     const, mount = (
-        replace(one, covariance=grown(one.covariance, _walk(sigma) * days, sigma))
+        replace(one, covariance=grown(one.covariance, _walk(sigma) * days, np.sqrt(before_any_pass(sigma))))
         for one, sigma in zip((memory.const, memory.mount), a_priori_sigmas(settings), strict=True)
     )
     return replace(memory, at_tai_s=at_tai_s, const=const, mount=mount)
@@ -101,26 +115,29 @@ def grown(covariance: Array, more: Array, sigma: Array) -> Array:
 
 
 def _walk(sigma: Array) -> Array:
-    """Variances that a day adds, (8,); none to what is not estimated."""
+    """Variances that a day adds, (12,); none to what is not estimated."""
     walk_deg = _WALK_DEG.copy()
     walk_deg[RF] = _WALK_SHARE * sigma[RF] / DEG
-    return np.where(sigma > 0.0, (walk_deg * DEG) ** 2, 0.0)
+    return np.concatenate((np.where(sigma > 0.0, (walk_deg * DEG) ** 2, 0.0), swing_walk(sigma)))
 
 
-def of_a_pass(sigma: Array) -> Array:
-    """Variances that every pass has of its own, (8,)."""
+def in_a_pass(known: Remembered, sigma: Array, tai_s: float) -> Remembered:
+    """The terms (8,) of a memory in a pass at a time, with what every pass has of its own; sigma: a-priori (8,)."""
     own_deg = _OF_A_PASS_DEG.copy()
     own_deg[RF] = _OF_A_PASS_SHARE * sigma[RF] / DEG
-    return np.where(sigma > 0.0, (own_deg * DEG) ** 2, 0.0)
+    now = known.at(tai_s)
+    own = np.where(sigma > 0.0, (own_deg * DEG) ** 2, 0.0)
+    return replace(now, covariance=grown(now.covariance, own, sigma))
 
 
 def priors(memory: PedestalMemory, settings: EstimatorSettings, at_tai_s: float) -> tuple[PedestalPrior, PedestalPrior]:
     """What const and mount say of a pass at a time."""
     now = aged(memory, settings, at_tai_s)
-    const, mount = (
-        PedestalPrior(one.mean, grown(one.covariance, of_a_pass(sigma), sigma), memory.noise)
+    seen = [
+        in_a_pass(one, sigma, at_tai_s)
         for one, sigma in zip((now.const, now.mount), a_priori_sigmas(settings), strict=True)
-    )
+    ]
+    const, mount = (PedestalPrior(one.mean, one.covariance, memory.noise) for one in seen)
     return const, mount
 
 

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from acu_daemon.assist.estimators.full.pedestal_prior import Doubt
+from acu_daemon.assist.mount_memory.day_and_night import at_time_of_day
 from acu_daemon.assist.mount_memory.pedestal_memory import (
     LATEST_COUNT,
     PedestalMemory,
     Remembered,
     a_priori_sigmas,
     aged,
-    grown,
-    of_a_pass,
+    in_a_pass,
     rezeroed,
     smoothed_noise,
 )
@@ -59,7 +59,7 @@ def updated(before: PedestalMemory, seen: PassEstimate, settings: EstimatorSetti
             return Updated(replace(before, doubts=doubts), why_not)
     sigmas = a_priori_sigmas(settings)
     const, mount = (
-        fused(one, _prior(one, sigma), estimate)
+        fused(one, at_time_of_day(seen.begin_tai_s), in_a_pass(one, sigma, seen.begin_tai_s).covariance, estimate)
         for one, sigma, estimate in zip((memory.const, memory.mount), sigmas, (seen.const, seen.mount), strict=True)
     )
     after = replace(
@@ -73,31 +73,26 @@ def updated(before: PedestalMemory, seen: PassEstimate, settings: EstimatorSetti
     return Updated(after, note=_preference_text(before, after))
 
 
-def fused(persistent: Remembered, prior: Array, estimate: Remembered) -> Remembered:
+def fused(persistent: Remembered, h: Array, prior: Array, estimate: Remembered) -> Remembered:
     """The persistent part of a state after a pass's estimate of it.
 
-    prior: covariance of the state in that pass, the persistent part's and what every pass has of its own; the estimate
-    was made with it.  K = P inv(A), m + K (x - m), P - K (A - C) K^T.
+    h: what that pass sees of the persistent part.  prior: covariance of the state in that pass, the persistent part's
+    and what every pass has of its own; the estimate was made with it.
+    K = P h^T inv(A), m + K (x - h m), P - K (A - C) K^T.
     """
     is_open = np.diag(prior) > 0.0
     which = np.ix_(is_open, is_open)
     unit = np.sqrt(np.diag(prior)[is_open])
     correlation = prior[which] / np.outer(unit, unit)
-    gain = persistent.covariance[which] / unit @ np.linalg.inv(correlation) / unit
-    mean, covariance = persistent.mean.copy(), persistent.covariance.copy()
-    mean[is_open] += gain @ (estimate.mean - persistent.mean)[is_open]
-    covariance[which] -= gain @ (prior - estimate.covariance)[which] @ gain.T
+    gain = persistent.covariance @ h[is_open].T / unit @ np.linalg.inv(correlation) / unit
+    mean = persistent.mean + gain @ (estimate.mean - h @ persistent.mean)[is_open]
+    covariance = persistent.covariance - gain @ (prior - estimate.covariance)[which] @ gain.T
     return Remembered(mean, (covariance + covariance.T) / 2.0)
 
 
 def _latest(doubts: tuple[Doubt, ...]) -> list[Doubt]:
     """The last, the last two and so on together: nobody knows since which pass an encoder is another."""
     return [sum(doubts[k + 1 :], start=doubts[k]) for k in range(len(doubts))]
-
-
-def _prior(persistent: Remembered, sigma: Array) -> Array:
-    prior: Array = grown(persistent.covariance, of_a_pass(sigma), sigma)
-    return prior
 
 
 def _rezeroed(memory: PedestalMemory, doubt: Doubt) -> Updated:
@@ -121,12 +116,13 @@ def _why_spoiled(seen: PassEstimate) -> str:
 
 def _why_surprising(memory: PedestalMemory, seen: PassEstimate, settings: EstimatorSettings) -> str:
     """Why a pass contradicts the memory of the mount; n + 4 sqrt(2 n) of n directions that it saw is no chance."""
-    prior, estimate = _prior(memory.mount, a_priori_sigmas(settings)[1]), seen.mount
+    expected, estimate = in_a_pass(memory.mount, a_priori_sigmas(settings)[1], seen.begin_tai_s), seen.mount
+    prior = expected.covariance
     is_open = np.diag(prior) > 0.0
     root = np.linalg.cholesky(prior[np.ix_(is_open, is_open)] + 1e-30 * np.eye(int(is_open.sum())))
     whitened = np.linalg.solve(root, estimate.covariance[np.ix_(is_open, is_open)])
     taken, directions = np.linalg.eigh(np.eye(len(root)) - np.linalg.solve(root, whitened.T))
-    off = directions.T @ np.linalg.solve(root, (estimate.mean - memory.mount.mean)[is_open])
+    off = directions.T @ np.linalg.solve(root, (estimate.mean - expected.mean)[is_open])
     is_seen = taken > _SEEN_SHARE
     count = int(np.count_nonzero(is_seen))
     innovation = float(np.sum(off[is_seen] ** 2 / taken[is_seen]))

@@ -43,6 +43,10 @@ class PassEstimate:
     noise_scale: float
     noise: NoiseCorrelation
 
+    @property
+    def begin_tai_s(self) -> float:
+        return self.at_tai_s - self.span_s
+
 
 def estimate_pass(
     source: Propagator, site: Site, settings: EstimatorSettings, memory: PedestalMemory, seen: Sights
