@@ -42,6 +42,7 @@ class Tracked:
     is_told_of_signal: bool = True
     was_acquired: bool = False
     last_tai_s: float = math.nan
+    first_tai_s: float = math.nan  # of a pass that was gone on with: of what was before nothing is known
     words: list[str] = field(default_factory=list)  # what else there is to say of it, each once
     hooks: list[HookResult] = field(default_factory=list)
     cancelled_by: str = ""
@@ -118,7 +119,9 @@ class PassCourse:
         if entry.state is PassState.PREPASS and seen.rise_in_s is not None and seen.rise_in_s <= 0.0:
             self.entry = entry = self._keeper.change(entry, PassState.PASS, "")
         tracked.is_told_of_signal = seen.is_told_of_signal
-        if not math.isnan(tracked.last_tai_s):
+        if math.isnan(tracked.last_tai_s):
+            tracked.first_tai_s = seen.tai_s
+        else:
             tracked.locked_s += (seen.tai_s - tracked.last_tai_s) * seen.is_acquired
             is_on_path = entry.state is PassState.PASS and seen.is_on_path is True
             tracked.on_path_s += (seen.tai_s - tracked.last_tai_s) * is_on_path
@@ -190,16 +193,24 @@ class PassCourse:
         elif not outcome.has_acquired and tracked.locked_s == 0.0:
             return PassState.FAILED, f"never acquired: {cause or NO_SIGNAL}"
         else:
-            said = f"signal for {tracked.locked_s:.0f} of {entry.useful_s:.0f} useful seconds"
-            is_degraded = entry.useful_s <= 0.0 or tracked.locked_s / entry.useful_s < DEGRADED_SHARE
+            useful_s = self._useful_s(entry)
+            said = f"signal for {tracked.locked_s:.0f} of {useful_s:.0f} useful seconds"
+            is_degraded = useful_s <= 0.0 or tracked.locked_s / useful_s < DEGRADED_SHARE
             state = PassState.DEGRADED if is_degraded else PassState.DONE
         return state, said if state is PassState.FAILED else "; ".join(text for text in (said, words) if text)
 
+    def _useful_s(self, entry: Entry) -> float:
+        """What there was to track of a pass, since a restart in it: how it was tracked before that nobody knows."""
+        first_tai_s = self._tracked.first_tai_s
+        if RESUMED not in self._tracked.words or entry.end_tai_s is None or math.isnan(first_tai_s):
+            return entry.useful_s
+        return min(entry.useful_s, max(0.0, entry.end_tai_s - first_tai_s))
+
     def _judged_by_path(self, entry: Entry, cause: str) -> tuple[PassState, str]:
         """Of a station that is told of no signal: whether the antenna was where the satellite should be."""
-        on_path_s = self._tracked.on_path_s
-        said = f"by program track, on the path for {on_path_s:.0f} of {entry.useful_s:.0f} useful seconds"
+        on_path_s, useful_s = self._tracked.on_path_s, self._useful_s(entry)
+        said = f"by program track, on the path for {on_path_s:.0f} of {useful_s:.0f} useful seconds"
         if on_path_s == 0.0:
             return PassState.FAILED, cause or "the antenna never came to the path"
-        is_degraded = on_path_s < DEGRADED_SHARE * entry.useful_s
+        is_degraded = on_path_s < DEGRADED_SHARE * useful_s
         return PassState.DEGRADED if is_degraded else PassState.DONE, said

@@ -11,6 +11,7 @@ from acu_daemon.cli.pass_checks import CHECKS_S
 from acu_daemon.cli.station_wind import Beside
 from acu_daemon.config.to_settings import control_config, driver_of, keyhole_rules, leaning, planned_tilt
 from acu_daemon.control.phantom import PhantomPass, fly_phantom
+from acu_daemon.edge.apart import apart
 from acu_daemon.errors import failure_text
 from acu_daemon.pointing.wrap import middle_deg, nearest_turn
 from acu_daemon.schedule.book import Entry
@@ -22,7 +23,8 @@ Bearing = tuple[float, float]  # azimuth 0 to 360, and elevation, encoder frame
 class PhantomCheck:
     """Owned by the loop.  found: of the entry that was looked at last; None: not flown, or it could not be."""
 
-    def __init__(self, config: Path, directory: Path, beside: Beside) -> None:
+    def __init__(self, config: Path, directory: Path, beside: Beside = apart) -> None:
+        """beside: does what takes seconds; a thread would make each tick late meanwhile."""
         self._config, self._directory, self._beside = config, directory, beside
         self._number = 0
         self._flying: asyncio.Task[PhantomPass] | None = None
@@ -35,7 +37,8 @@ class PhantomCheck:
         if self._number != entry.number and is_time and place is not None:
             self.close()
             self._number, self.found = entry.number, None
-            self._flying = asyncio.create_task(self._beside(self._fly, entry, now_tai_s, place), name="phantom")
+            given = self._config, self._directory, entry, now_tai_s, place
+            self._flying = asyncio.create_task(self._beside(fly, *given), name="phantom")
         if self._flying is None or not self._flying.done():
             return
         flown, self._flying = self._flying, None
@@ -61,27 +64,26 @@ class PhantomCheck:
         """What was found, for people."""
         return "" if self.found is None else str(self.found)
 
-    def _fly(self, entry: Entry, now_tai_s: float, place: Bearing) -> PhantomPass:
-        """Raises: AcuDaemonError: of the satellite's files or elements."""
-        target = load_target(
-            self._config, entry.satellite, now_tai_s, at_tai_s=entry.rise_tai_s, folders=(self._directory,)
-        )
-        station, azimuth = target.station, target.station.acu.azimuth.limits()
-        near_deg = middle_deg(azimuth) if entry.start_az_deg is None else entry.start_az_deg
-        turned_deg = nearest_turn(place[0], near_deg, azimuth)
-        coming = coming_pass(target, max(now_tai_s, entry.rise_tai_s - 60.0))
-        tilt = planned_tilt(station, target.elements.propagator, coming)
-        return fly_phantom(
-            target.elements.propagator,
-            leaning(station.site, tilt),
-            coming,
-            control_config(station, target.satellite, driver_of(station), 0.0, tilt),
-            keyhole_rules(station),
-            (place[0] if turned_deg is None else turned_deg, place[1]),
-        )
-
     def close(self) -> None:
         """End what runs beside the loop."""
         if self._flying is not None:
             self._flying.cancel()
             self._flying = None
+
+
+def fly(config: Path, directory: Path, entry: Entry, now_tai_s: float, place: Bearing) -> PhantomPass:
+    """Fly the pass of an entry from where the antenna stands.  Raises: AcuDaemonError: of files or elements."""
+    target = load_target(config, entry.satellite, now_tai_s, at_tai_s=entry.rise_tai_s, folders=(directory,))
+    station, azimuth = target.station, target.station.acu.azimuth.limits()
+    near_deg = middle_deg(azimuth) if entry.start_az_deg is None else entry.start_az_deg
+    turned_deg = nearest_turn(place[0], near_deg, azimuth)
+    coming = coming_pass(target, max(now_tai_s, entry.rise_tai_s - 60.0))
+    tilt = planned_tilt(station, target.elements.propagator, coming)
+    return fly_phantom(
+        target.elements.propagator,
+        leaning(station.site, tilt),
+        coming,
+        control_config(station, target.satellite, driver_of(station), 0.0, tilt),
+        keyhole_rules(station),
+        (place[0] if turned_deg is None else turned_deg, place[1]),
+    )

@@ -32,6 +32,7 @@ from acu_daemon.control.tick_input import StowBy, StowWish
 from acu_daemon.control.tracking.approach import longest_lead_s
 from acu_daemon.daemon.snapshot import Snapshot, StationFacts
 from acu_daemon.daemon.tally import Tally
+from acu_daemon.edge.apart import apart
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.elements_fetching import ElementsFetching
 from acu_daemon.edge.hook_rights import chosen_user
@@ -57,6 +58,7 @@ class StationDay:
         station: StationFile,
         *,
         beside: Beside = asyncio.to_thread,
+        fly_beside: Beside = apart,
         check: Check | None = None,
         has_phantom: bool = True,
         is_rehearsal: bool = False,
@@ -65,6 +67,7 @@ class StationDay:
     ) -> None:
         """beside: does what takes long, beside the loop.  check: what of a pass is a no-go; None: files and ACU.
 
+        fly_beside: does what takes seconds, where a thread would make ticks late.
         has_phantom: each pass is flown before it.
         """
         self._is_rehearsal = is_rehearsal
@@ -78,7 +81,7 @@ class StationDay:
         self.keeper = ScheduleKeeper(config, clock, file, station, beside, self._tally)
         self.course = PassCourse(self.keeper, self.hooks, self.about)
         self.checks = PassChecks(check or self._no_gos, beside, self._tell_no_go)
-        self.phantom = PhantomCheck(config, self._directory, beside) if has_phantom else None
+        self.phantom = PhantomCheck(config, self._directory, fly_beside) if has_phantom else None
         self._place: tuple[float, float] | None = None  # of the newest reading
         self._next_rise = NextRise(config, self._directory, beside)
         self.wind = StationWind(station.wind, config, beside)

@@ -67,6 +67,7 @@ class StationRuns:
             ScheduleFile(setup.directory, put=setup.put),
             first.station,
             beside=setup.beside,
+            fly_beside=setup.fly_beside,
             check=setup.check,
             has_phantom=setup.has_phantom,
             is_rehearsal=setup.clock.is_rehearsal,

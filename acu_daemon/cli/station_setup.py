@@ -16,6 +16,7 @@ from acu_daemon.config.load import satellite_names
 from acu_daemon.control.tracking.pass_plan import PlanAnswer, PlanRequest
 from acu_daemon.daemon.background import fit_deadline_s
 from acu_daemon.daemon.service import PassJob
+from acu_daemon.edge.apart import apart
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.fit import FitRunner, ProcessFitRunner
 from acu_daemon.edge.link import Link
@@ -40,6 +41,7 @@ class StationSetup:
     older: tuple[Path, ...] = ()
     page: PageFrame | None = None
     beside: Beside = asyncio.to_thread
+    fly_beside: Beside = apart
     put: Callable[[Job], object] = lambda job: job()  # writes the schedule: by a queue, where the loop must not wait
     has_phantom: bool = True
     check: Check | None = None  # of a satellite at a TAI; None: as `acu-daemon check`

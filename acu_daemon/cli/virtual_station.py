@@ -130,6 +130,7 @@ def run_days(
             math.inf,
             False,
             beside=beside,
+            fly_beside=beside,
             make_runner=runner,
             check=check,
             is_recording=report is not None,
