@@ -6,11 +6,12 @@
     .venv/bin/python scripts/screening_ablation.py --case hunting    the cases with that word in their name
     .venv/bin/python scripts/screening_ablation.py --place 2 3 4 5   other passes, real and made
 
-Bad minutes are those of gate_figures.py.  First locks are a minute of something else before 20 s of the satellite.
-Good readings are the satellite's own all the time: elements that are off, noise that grows or goes on for seconds, a
-loss with encoders that are off.  One real pass and one made from an element set as wrong as good ones are, both in
-the simulator's air.  Change: the largest angle between the prediction of the next 300 s and that from the good readings
-alone.  Seen: bad minutes in which a reason is said for four fifths of the time from 5 s on.
+Bad minutes are those of gate_figures.py.  First locks are a minute of something else before 20 s of the satellite;
+short locks are 8 and 15 s of the satellite before a bad minute.  Good readings are the satellite's own all the time:
+elements that are off, noise that grows or goes on for seconds, a loss with encoders that are off.  Passes are real, and
+made from an element set as wrong as good ones are, all in the simulator's air.  Change: the largest angle between the
+prediction of the next 300 s and that from the good readings alone.  Seen: bad minutes in which a reason is said for
+four fifths of the time from 5 s on.
 """
 
 import argparse
@@ -67,6 +68,8 @@ ASKED_DEG = 0.05
 REASON_FROM_S, REASON_SHARE = 5.0, 0.8
 LONG_S = 500.0
 ALL_ON, HIGHEST, DWELL = "(all on)", "highest elevation", "dwell"
+
+GROUPS = ("bad minute", "first lock", "short lock", "good")
 
 Off = Callable[[], list[AbstractContextManager[Any]]]
 
@@ -191,6 +194,20 @@ def first_locks(place: Place, hz: float) -> Iterator[Case]:
         yield Case("first lock", name, readings.part(is_on), t[is_on], place.settings, place.source, at_s)
 
 
+SHORT_LOCKS_S = (8.0, 15.0)
+AFTER_SHORT = ("side lobe along, no AGC", "side lobe with AGC", "drawn away, 0.05 deg/s", "another satellite")
+
+
+def short_locks(place: Place, hz: float) -> Iterator[Case]:
+    """A few good seconds before the bad minute."""
+    for name in AFTER_SHORT:
+        readings, t = minutes(place, hz, KINDS[name], 1, BEGIN_S)
+        for lock_s in SHORT_LOCKS_S:
+            is_on = t >= -lock_s
+            on, label = readings.part(is_on), f"{lock_s:g} s of lock, then {name}"
+            yield Case("short lock", label, on, t[is_on], place.settings, place.source, BAD_S + AFTER_S)
+
+
 def good_readings(place: Place, hz: float) -> Iterator[Case]:
     readings, t = minutes(place, hz, Kind("", steady(0.0, 0.0)), 1, BEGIN_S)
     own = partial(Case, "good", settings=place.settings, is_bad=False)
@@ -281,7 +298,7 @@ def figures(place: Place, whole: Case, check: str, right: FitResult | None) -> F
 @cache
 def cases_of(number: int, hz: float) -> dict[str, Case]:
     place = place_of(number)
-    made = (bad_minutes, first_locks, good_readings)
+    made = (bad_minutes, first_locks, short_locks, good_readings)
     return {case.name: case for make in made for case in make(place, hz)}
 
 
@@ -296,7 +313,7 @@ def measured(job: tuple[int, float, str, tuple[str, ...]]) -> list[Figures]:
 def row(check: str, found: list[Figures]) -> str:
     """A line of the table."""
     cells = []
-    for group in ("bad minute", "first lock", "good"):
+    for group in GROUPS:
         change_deg = np.array([one.change_deg for one in found if one.group == group and one.check == check])
         beyond = f"{np.count_nonzero(change_deg > ASKED_DEG)} of {change_deg.size}"
         cells.append(
@@ -327,7 +344,11 @@ def main() -> int:
         if asked.case in name
     ]
     found = [one for some in results_of(run_campaign(measured, jobs)) for one in some]
-    say("| off | bad minute: median / worst, deg, beyond 0.05 | seen | first lock | good |\n|---|---|---|---|---|")
+    say(
+        "| off | bad minute: median / worst, deg, beyond 0.05 | seen | first lock | short lock | good |\n"
+        + "|---" * 6
+        + "|"
+    )
     for check in checks:
         say(row(check, found))
     return 0
