@@ -144,10 +144,9 @@ def keyhole_window(
     sky: SimulatedSky, span: tuple[float, float], loss: tuple[float, float]
 ) -> tuple[tuple[float, float], float]:
     """When the azimuth drive cannot be on the true path, and how long it leaves half the beam even at its best."""
-    tai_s = np.arange(*span, 0.1)
-    seen = [sky.direction(float(t)) or (math.nan, math.nan, math.nan) for t in tai_s]
-    az_deg = np.degrees(np.unwrap(np.radians([one[0] for one in seen])))
-    el_deg = np.array([one[1] for one in seen])
+    every_s = [(float(t), sky.direction(float(t))) for t in np.arange(*span, 0.1)]
+    shown = np.array([(t, *one[:2]) for t, one in every_s if one is not None])  # late: nothing yet as the table begins
+    tai_s, az_deg, el_deg = shown[:, 0], np.degrees(np.unwrap(np.radians(shown[:, 1]))), shown[:, 2]
     path = SkyPath(az_deg, el_deg, np.gradient(az_deg, 0.1), np.gradient(el_deg, 0.1), 0.1)
     best, _ = follow_path(path, KeyholeRules(AZIMUTH))
     off = np.flatnonzero(np.abs(best.az_deg - az_deg) > 1e-3)
