@@ -30,18 +30,22 @@ from acu_daemon.sim.mount_axes import MountAxes
 NOISE_DEG = 0.03
 SQUARE, BIASED = MountAxes(), MountAxes(ia_deg=0.05, ie_deg=-0.04)
 CROOKED = MountAxes(0.05, -0.04, 0.005, 0.004, -0.005, 0.004, 0.004)
-CASES = {  # whether the daemon is told of the air, whether its scale is a state, the pedestal
-    "vacuum": (False, False, SQUARE),
-    "told air, no scale": (True, False, SQUARE),
-    "told air, scale a state": (True, True, SQUARE),
-    "the same, encoders off": (True, True, BIASED),
-    "the same, crooked mount": (True, True, CROOKED),
+ZENITH = {"max_fit_elevation_deg": 90.0}
+REMEMBERED = {"bias_sigma_azimuth_deg": 0.007, "bias_sigma_elevation_deg": 0.0035}  # after some twenty passes
+CASES: dict[str, tuple[bool, bool, MountAxes, dict[str, float]]] = {  # told of the air, scale a state, pedestal, more
+    "vacuum": (False, False, SQUARE, {}),
+    "told air, no scale": (True, False, SQUARE, {}),
+    "told air, scale a state": (True, True, SQUARE, {}),
+    "the same, encoders off": (True, True, BIASED, {}),
+    "the same, crooked mount": (True, True, CROOKED, {}),
+    "scale a state, read up to the zenith": (True, True, SQUARE, ZENITH),
+    "scale a state, encoders known": (True, True, SQUARE, REMEMBERED),
 }
 
 
 def worst_deg(name: str, case: str, draws: int) -> list[float]:
     """The worst angles of the unseen half of a pass."""
-    is_told, has_scale, mount = CASES[case]
+    is_told, has_scale, mount, more = CASES[case]
     sky, source = real_sky(name), real_elements(name)
     found = []
     for seed in range(draws):
@@ -50,7 +54,8 @@ def worst_deg(name: str, case: str, draws: int) -> list[float]:
         az_deg, el_deg = np.array([mount.encoders_deg(*one) for one in pairs]).T
         shown = replace(apparent, az_deg=az_deg % 360.0, el_deg=el_deg)
         readings = readings_of(shown, AngleBias(), NOISE_DEG, np.random.default_rng(seed))
-        site, settings = apparent.site if is_told else sky.site, EstimatorSettings(NOISE_DEG, NOISE_DEG)
+        site = apparent.site if is_told else sky.site
+        settings = replace(EstimatorSettings(NOISE_DEG, NOISE_DEG), **more)
         if has_scale:
             settings = with_scale(settings, site)
         used = sky.tai_s.size // 2
