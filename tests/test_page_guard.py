@@ -1,5 +1,6 @@
 """Who may ask the page for what."""
 
+import errno
 import json
 from pathlib import Path
 
@@ -70,6 +71,15 @@ def test_a_token_file_that_is_not_there_or_none_says_what_to_do(tmp_path: Path) 
     (tmp_path / "folder").mkdir(mode=0o700)
     with pytest.raises(UsageError, match="expected a file"):
         read_token(tmp_path / "folder")
+
+
+def test_a_token_of_another_user_says_whose_it_must_be(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def denied(*_: object) -> int:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr("acu_daemon.edge.secret_file.os.open", denied)  # root may read all
+    with pytest.raises(UsageError, match=r"Permission denied; it must belong to the daemon's user: chown$"):
+        read_token(tmp_path / "token")
 
 
 def sealed(order: object, nonce: str = "n", token: bytes = TOKEN) -> tuple[str, str]:

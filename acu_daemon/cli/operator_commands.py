@@ -24,7 +24,7 @@ Config = Annotated[
         help="The running daemon's configuration: needed only where several run.  Without it, several are listed.",
     ),
 ]
-Rehearsal = Annotated[bool, typer.Option("--rehearsal", help="The daemon that runs as a rehearsal (--at).")]
+Rehearsal = Annotated[bool, typer.Option("--rehearsal", help="The daemon of `rehearse` or `run --at`.")]
 
 Satellite = Annotated[str | None, typer.Option("--satellite", metavar="NAME", help="Whose pass.")]
 At = Annotated[str | None, typer.Option("--at", metavar="UTC", help="A time at which it is up.")]

@@ -137,7 +137,7 @@ def no_daemon(directory: Path) -> str:
     """That nobody is there, and what to do."""
     return (
         f"{directory}: no daemon runs with this state directory; name the --state it was started with "
-        "(--rehearsal for one started with --at), or start it: acu-daemon run"
+        "(--rehearsal for `rehearse` and `run --at`), or start it: acu-daemon run"
     )
 
 

@@ -17,8 +17,12 @@ def read_secret(path: Path, key: str, make: str = "") -> bytes:
     """
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-    except OSError as error:
+    except FileNotFoundError as error:
         raise UsageError(f"{key} {path}: {error.strerror}{make and '; make one: '}{make}") from None
+    except PermissionError as error:
+        raise UsageError(f"{key} {path}: {error.strerror}; it must belong to the daemon's user: chown") from None
+    except OSError as error:
+        raise UsageError(f"{key} {path}: {error.strerror}") from None
     try:
         found = os.fstat(descriptor)
         mode = stat.S_IMODE(found.st_mode)
