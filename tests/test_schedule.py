@@ -150,6 +150,14 @@ def test_a_forced_pass_is_granted_before_a_better_one_and_a_frozen_one_before_th
     assert granted == ["A", "C"]
 
 
+@pytest.mark.parametrize("wish", [Wish.FORCE, Wish.GO_ON])
+def test_a_forced_pass_that_may_be_cut_stays_whole_though_each_of_its_parts_is_forced(wish: Wish):
+    tracks = [track("A", 0.0, may_be_cut=True, min_useful_s=60.0), track("B", 2000.0, priority=9)]
+    [granted, _] = decide(tracks, replace(RULES, requests=(PassRequest("A", DAY + 300.0, wish),)))
+    assert granted.slot is not None
+    assert (granted.track.satellite, granted.slot.is_cut) == ("A", False)
+
+
 def test_each_pass_that_is_not_granted_says_why():
     window = Window(DAY + 5000.0, DAY + 5600.0, "greasing")
     rules = replace(RULES, windows=(window,), requests=(PassRequest("OUT", DAY + 9000.0, Wish.EXCLUDE),))

@@ -14,7 +14,7 @@ The plan is exact over these slots.
 What must be comes first: frozen reservations, then the passes that people force, each worth more than all others.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -79,12 +79,17 @@ def best_slots(
     if place is not None:
         slots = [joined for slot in slots if (joined := _joined(slot, place, rules)) is not None]
     slots.sort(key=lambda slot: (slot.end_tai_s, slot.start_tai_s))
-    forced_passes = {id(track) for track in forced}
-    extra = [
-        FROZEN_VALUE if id(slot.track) in frozen_passes else FORCED_VALUE if id(slot.track) in forced_passes else 0.0
-        for slot in slots
-    ]
+    most_s = {id(track): 0.0 for track in forced}
+    for slot in slots:
+        if id(slot.track) in most_s:
+            most_s[id(slot.track)] = max(most_s[id(slot.track)], slot.useful_s)
+    extra = [FROZEN_VALUE if id(slot.track) in frozen_passes else _forced_value(slot, most_s) for slot in slots]
     return _best_chain(slots, np.array(extra), rules)
+
+
+def _forced_value(slot: Slot, most_s: Mapping[int, float]) -> float:
+    """Of a part only its share: two parts of a forced pass are not worth more than the whole.  most_s: by track."""
+    return FORCED_VALUE * slot.useful_s / most if (most := most_s.get(id(slot.track), 0.0)) > 0.0 else 0.0
 
 
 def _joined(slot: Slot, place: AntennaPlace, rules: StationRules) -> Slot | None:
