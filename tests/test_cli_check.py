@@ -160,6 +160,14 @@ def test_a_check_asks_and_never_changes_anything(tmp_path: Path) -> None:
         assert small.asked == [Poll(), Identify(), ReadFaults()]
 
 
+def test_the_acu_that_a_station_was_started_at_is_asked_in_place_of_its_files(tmp_path: Path) -> None:
+    with acu() as there, acu() as other:
+        config = write(tmp_path, station(other.url), scd=BROUWER)
+        found = {one.what: one for one in check.findings(config, "scd", SetClock().tai_s(), tmp_path, there.url)}
+    assert found["station.toml"].detail.endswith(f"ACU at {there.url}")
+    assert (found["ACU"].verdict, bool(there.asked), other.asked) == ("GO", True, [])
+
+
 def test_a_simulated_acu_is_called_a_simulation(tmp_path: Path) -> None:
     with acu(identity=Identity("3842", "S2")) as small:
         done = acu_daemon("check", "--config", write(tmp_path, station(small.url), scd=BROUWER))

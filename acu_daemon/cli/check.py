@@ -17,6 +17,7 @@ from acu_daemon.cli.options import (
     Config,
     antenna_of,
     parse_utc,
+    station_at,
 )
 from acu_daemon.cli.own_daemon import find_daemon
 from acu_daemon.config.elements_tables import ElementsSourcesSection
@@ -75,14 +76,17 @@ def command(
         raise typer.Exit(1)
 
 
-def findings(config: Path, satellite: str | None, now_tai_s: float, state: Path | None) -> Iterator[Finding]:
-    """Everything that the command shows, a line after the other."""
+def findings(
+    config: Path, satellite: str | None, now_tai_s: float, state: Path | None, acu: str | None = None
+) -> Iterator[Finding]:
+    """Everything that the command shows, a line after the other.  acu: where the ACU is asked; None: at acu.url."""
     try:
         station, earth = at_date(load_station(config), config, now_tai_s)
     except UsageError as error:
         yield Finding(NO_GO, "station.toml", str(error))
         return
-    yield Finding(GO, "station.toml", f"{station.station.name}, ACU at {station.acu.url}")
+    asked = station_at(station, acu)
+    yield Finding(GO, "station.toml", f"{station.station.name}, ACU at {asked.acu.url}")
     yield Finding(GO, "place", place_text(station.site, now_tai_s))
     if station.safety.arm == "manual":
         yield Finding(WARN, "arming", '[safety] arm = "manual": the daemon writes nothing until a person arms it')
@@ -107,7 +111,7 @@ def findings(config: Path, satellite: str | None, now_tai_s: float, state: Path 
     for name in names:
         yield from satellite_findings(config, name, now_tai_s, folders)
     try:
-        link = make_link(station.acu.url)
+        link = make_link(asked.acu.url)
         check_rate(link, driver_of(station), station.acu.period_s, station.acu.device_delay_s)
         yield Finding(GO, "line rate", f"{link.description} carries {1 / station.acu.period_s:g} writes a second")
     except UsageError as error:
@@ -117,7 +121,7 @@ def findings(config: Path, satellite: str | None, now_tai_s: float, state: Path 
         yield held_finding(daemon)
         if daemon.seen is not None:
             return
-    for finding in run_loop(acu_findings, station):
+    for finding in run_loop(acu_findings, asked):
         if finding.verdict == NO_GO and "another client holds" in finding.detail:
             hint = "; if it is an acu-daemon, name its state directory with --state"
             yield replace(finding, verdict=WARN) if daemon else replace(finding, detail=finding.detail + hint)

@@ -159,10 +159,14 @@ def load_target(
 
 def at_acu(target: Target, url: str | None) -> Target:
     """The same over the same station, with its ACU reached at another URL; None: where its file says."""
+    return target if url is None else replace(target, station=station_at(target.station, url))
+
+
+def station_at(station: StationFile, url: str | None) -> StationFile:
+    """The same station with its ACU reached at another URL; None: where its file says."""
     if url is None:
-        return target
-    acu = target.station.acu.model_copy(update={"url": url})
-    return replace(target, station=target.station.model_copy(update={"acu": acu}))
+        return station
+    return station.model_copy(update={"acu": station.acu.model_copy(update={"url": url})})
 
 
 def last_fit(satellite: SatelliteFile, station: StationFile, folders: Sequence[Path]) -> LastFit | None:

@@ -192,7 +192,9 @@ def command(
         if satellite is None:
             if record is not None:
                 raise UsageError("--record needs --satellite: of a station with many, a file belongs to one pass")
-            setup = StationSetup(config, clock, link, directory, files, end_s, shadow, older, put=files.put, page=page)
+            setup = StationSetup(
+                config, clock, link, directory, files, end_s, shadow, older, put=files.put, page=page, acu=acu
+            )
             runner = ends.enter_context(loop_runner())
             outcome = _watched(runner, run_station(setup, clock, target, live))
             if not outcome.is_stopped:

@@ -59,6 +59,7 @@ class StationDay:
         *,
         beside: Beside = asyncio.to_thread,
         fly_beside: Beside = apart,
+        acu: str | None = None,
         check: Check | None = None,
         has_phantom: bool = True,
         is_rehearsal: bool = False,
@@ -67,10 +68,10 @@ class StationDay:
     ) -> None:
         """beside: does what takes long, beside the loop.  check: what of a pass is a no-go; None: files and ACU.
 
-        fly_beside: does what takes seconds, where a thread would make ticks late.
+        fly_beside: does what takes seconds, where a thread would make ticks late.  acu: URL of --acu.
         has_phantom: each pass is flown before it.
         """
-        self._is_rehearsal = is_rehearsal
+        self._is_rehearsal, self._acu = is_rehearsal, acu
         self.config, self._clock, self._directory = config, clock, file.path.parent
         self._tally = Tally() if tally is None else tally
         self._files = ConfigurationWatch(config)
@@ -157,7 +158,7 @@ class StationDay:
         return max(lead_s, self.station.schedule.pre_s) + SPARE_S + self.station.hooks.before_move_s
 
     def _no_gos(self, satellite: str, now_tai_s: float) -> list[str]:
-        found = list(findings(self.config, satellite, now_tai_s, self._directory))
+        found = list(findings(self.config, satellite, now_tai_s, self._directory, self._acu))
         self._tally.checks = {one.what: one.verdict != NO_GO for one in found}
         return [f"{one.what}: {one.detail}" for one in found if one.verdict == NO_GO and one.what != HOOKS]
 

@@ -68,6 +68,7 @@ class StationRuns:
             first.station,
             beside=setup.beside,
             fly_beside=setup.fly_beside,
+            acu=setup.acu,
             check=setup.check,
             has_phantom=setup.has_phantom,
             is_rehearsal=setup.clock.is_rehearsal,

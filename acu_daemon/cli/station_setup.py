@@ -29,7 +29,7 @@ Reporter = Callable[[TapeFile, Writer, Path], Coroutine[Any, Any, None]]
 
 @dataclass(frozen=True, slots=True)
 class StationSetup:
-    """What stays the same while the station runs.  end_s: of --duration, on CLOCK_MONOTONIC."""
+    """What stays the same while the station runs.  end_s: of --duration, on CLOCK_MONOTONIC.  acu: URL of --acu."""
 
     config: Path
     clock: Clock
@@ -42,6 +42,7 @@ class StationSetup:
     page: PageFrame | None = None
     beside: Beside = asyncio.to_thread
     fly_beside: Beside = apart
+    acu: str | None = None
     put: Callable[[Job], object] = lambda job: job()  # writes the schedule: by a queue, where the loop must not wait
     has_phantom: bool = True
     check: Check | None = None  # of a satellite at a TAI; None: as `acu-daemon check`
