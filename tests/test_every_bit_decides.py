@@ -20,6 +20,7 @@ from acu_daemon.drivers.sa3842.field_status import contradictions
 from acu_daemon.drivers.sa3842.messages import Faults, Status
 from acu_daemon.drivers.sa3842.sa3842_driver import field_reply
 from acu_daemon.model import AxisLimits, Prediction, Reading
+from acu_daemon.pointing.envelope import Envelope
 
 FLAGS, BITS = (
     [field.name for field in fields(kind) if field.name.startswith(("is_", "are_", "has_"))]
@@ -65,6 +66,20 @@ def test_an_axis_that_stands_is_excused_by_the_switch_on_its_commands_side_and_b
     name = "azimuth" if right else "elevation"
     excused = switch is not None and ENDS[switch] == SIDES[side]
     assert state.latch.problem == ("" if excused else f"{name} stands still away from its command")
+
+
+@pytest.mark.parametrize("switch", [*ENDS, None])
+@pytest.mark.parametrize("side", [1, -1])
+def test_beside_the_zenith_an_azimuth_that_stands_is_excused_by_the_switch_on_its_goals_side_and_by_no_other(
+    switch: str | None, side: int
+) -> None:
+    """There a whole turn is little on the sky; the time that goes by without a motion tells."""
+    config = replace(CONFIG, envelope=Envelope(AxisLimits(-80.0, 280.0, 20.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0)))
+    seen = replace(status(AcuMode.REMOTE_BACKUP, **({switch: True} if switch else {})), el_deg=89.9)
+    before = remembering(ready(TrackState.HOLD_FITTED, seen), hold_from_tai_s=NOW)
+    state, _ = ticks(before, [seen] * 120, standing(40.0 * side, 89.9 - EL_DEG), config)
+    excused = switch is not None and ENDS[switch] == (side, 0)
+    assert state.latch.problem == ("" if excused else "azimuth stands still away from its command")
 
 
 @pytest.mark.parametrize("side", SIDES)

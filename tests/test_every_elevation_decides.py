@@ -18,11 +18,11 @@ from acu_daemon.control.safety.encoder_watch import FROZEN_DEG, EncoderWatch, wa
 from acu_daemon.control.safety.status_plausibility import CONFIRMED_COUNT, CONFIRMED_DEG, RATE_MARGIN, SLACK_DEG
 from acu_daemon.control.state import Scan, StartStage
 from acu_daemon.control.tick_input import Observation, PassPlan, Sky, TickInput
-from acu_daemon.control.tracking.causes import HEARD_BEAMS, ON_POINT_BEAMS, RESUME_DEG, find_causes
+from acu_daemon.control.tracking.causes import GLANCE_S, HEARD_BEAMS, ON_POINT_BEAMS, RESUME_DEG, find_causes
 from acu_daemon.control.tracking.register_limiter import limit
 from acu_daemon.control.tracking.scan import DWELL_S, ON_PLACE_BEAMS, go_on, look, pace_s_s, row_deg
 from acu_daemon.control.tracking.state_table import Cause, TrackState
-from acu_daemon.control.tracking.track_frame import beside, offset_of
+from acu_daemon.control.tracking.track_frame import SIGMAS, beside, offset_of
 from acu_daemon.daemon.motion import Motion
 from acu_daemon.model import AxisLimits, Model, Pointing, Prediction, Reading
 from acu_daemon.pointing.axis import AxisState
@@ -164,11 +164,17 @@ def test_a_row_lies_beside_the_path_by_its_part_of_a_beam(el_deg: float) -> None
 
 
 def causes(
-    path: Prediction, place: tuple[float, float], track: TrackState, seen: AcuStatus, from_rise_s: float
+    path: Prediction,
+    place: tuple[float, float],
+    track: TrackState,
+    seen: AcuStatus,
+    from_rise_s: float,
+    in_state_s: float = 1.0,
 ) -> set[Cause]:
     plan = PassPlan(NOW - from_rise_s, NOW + 500.0, NOW - 200.0, 100.0, path.at(NOW).el_deg)
     seen = replace(seen, az_deg=place[0] % 360.0, el_deg=place[1])
-    state = remembering(track=track, entered_tai_s=NOW - 1.0, stage=StartStage.READY, status=seen, az_deg=place[0])
+    entered = {"track": track, "entered_tai_s": NOW - in_state_s}
+    state = remembering(stage=StartStage.READY, status=seen, az_deg=place[0], **entered)
     return find_causes(state, TickInput(Observation(), Sky(path, None, plan), NOW), CONFIG)
 
 
@@ -215,6 +221,19 @@ def test_autotrack_that_is_still_selected_goes_on_within_five_degrees_on_the_sky
         for share, goes_on in ((0.9, True), (1.1, False)):
             place = off_path(el_deg, course_deg, 0.0, side * share * (RESUME_DEG + 0.15 * SKY_DEG_S))
             assert (Cause.STILL_SELECTED in causes(path, place, TrackState.IDLE, SELECTED, 1.0)) == goes_on
+
+
+@el_places
+@courses
+def test_a_glance_is_short_where_the_time_in_doubt_is_more_than_half_a_beam_on_the_sky(
+    el_deg: float, course_deg: float
+) -> None:
+    place = (100.0, el_deg)
+    for share, is_short in ((0.9, False), (1.1, True)):
+        late_s = share * CONFIG.beamwidth_deg / 2.0 / SKY_DEG_S / SIGMAS
+        path = replace(great_circle(el_deg, course_deg), spread=(late_s, 0.0))
+        found = causes(path, place, TrackState.ACQUIRE_TLE, SELECTED, 50.0, in_state_s=GLANCE_S[TrackState.ACQUIRE_TLE] + 1.0)
+        assert (Cause.ACQUIRE_OVER in found) == is_short
 
 
 @pytest.mark.parametrize("el_deg", [20.0, 40.0, 60.0, 74.0])

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from flights import demo_target
 from made_orbits import EPOCH_TAI_S, circular, site, visible
 from real_passes import noisy, sky_angles_deg
 
@@ -20,9 +21,11 @@ from acu_daemon.assist.estimators.full.estimated_states import (
     states_of,
 )
 from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
+from acu_daemon.assist.estimators.known_bias import without_bias
 from acu_daemon.assist.mount_model import encoder_look, sky_covariance
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings
-from acu_daemon.model import Readings
+from acu_daemon.config.to_settings import estimator_settings
+from acu_daemon.model import Correction, FitResult, Readings
 from acu_daemon.orbit.frames import itrs_from_teme
 from acu_daemon.sim.mount_axes import MountAxes
 from acu_daemon.units import DEG
@@ -134,6 +137,29 @@ def test_a_state_that_alone_is_open_is_found_with_its_sign_and_goes_into_the_pre
     assert np.abs(found[others] / SIGMAS[others]).max() < 0.05
     seen = encoder_look(SOURCE.corrected(fit.correction), tai_s, GIVEN, fit)
     assert sky_angles_deg(seen.az_deg, seen.el_deg, az_deg, el_deg).max() < 0.002
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("state", [*range(6, 10), *range(13, 17)], ids=lambda one: NAMES[one])
+def test_a_bias_that_is_known_alone_is_taken_away_with_its_sign(state: int, sign: float):
+    x = np.zeros(STATE_COUNT)
+    x[state] = sign * SIGMAS[state]
+    tai_s = visible(SOURCE, GIVEN, 1.0)
+    seen = encoder_look(SOURCE, tai_s, GIVEN, None)
+    fit = FitResult("full", Correction(), float(tai_s[0]), 9, 0, 0.0, 0.0, 0.0, bias=bias_of(x))
+    shown_at = encoder_look(SOURCE, tai_s, GIVEN, fit)
+    left = without_bias(Readings(tai_s, shown_at.az_deg, shown_at.el_deg), fit.bias, GIVEN, seen.range_m)
+    added_deg = sky_angles_deg(shown_at.az_deg, shown_at.el_deg, seen.az_deg, seen.el_deg).max()
+    assert added_deg > 0.02
+    assert sky_angles_deg(left.az_deg, left.el_deg, seen.az_deg, seen.el_deg).max() < 0.2 * added_deg  # to its square
+
+
+def test_every_sigma_of_a_survey_goes_to_its_own_state():
+    surveyed = {f"{name}_sigma_deg": 0.01 * k for k, name in enumerate(("ia", "ca", "ie", "npae", "an", "aw", "tf"), 1)}
+    target = demo_target(mount=surveyed)
+    covariance = make_prior(SOURCE, estimator_settings(target.station, target.satellite), EPOCH_TAI_S).covariance
+    states = [6, 7, 8, 13, 14, 15, 16]
+    assert np.sqrt(np.diag(covariance))[states] / DEG == pytest.approx(list(surveyed.values()))
 
 
 def test_every_sigma_goes_to_its_own_state():

@@ -18,6 +18,7 @@ from acu_daemon.model import AxisLimits, Model, Reading
 from acu_daemon.pointing.axis import AxisState, step
 from acu_daemon.pointing.envelope import Envelope
 from acu_daemon.pointing.keyhole import KeyholeRules, SkyPath, follow_path
+from acu_daemon.pointing.plunge import RATE_SHARE, Branches, way_over
 from acu_daemon.pointing.reach import out_of_reach
 from acu_daemon.pointing.wrap import (
     choose_turn,
@@ -61,6 +62,29 @@ def test_the_way_through_the_keyhole_is_mirrored_with_its_path(top_deg, speed_de
     assert np.allclose(other.az_rate_deg_s, -followed.az_rate_deg_s, atol=1e-9)
     assert np.allclose(other.el_deg, followed.el_deg, atol=1e-9)
     assert (crossing is None) == (other_crossing is None)
+
+
+@pytest.mark.parametrize("drive", [(0.2, 10.0), (0.5, 0.2), (1.0, 10.0), (4.0, 1.0), (20.0, 10.0)])
+@pytest.mark.parametrize("top_deg", [86.0, 88.0, 89.0, 89.8])
+def test_the_way_over_the_top_is_mirrored_with_its_path_and_asks_its_share_of_the_drive(
+    top_deg: float, drive: tuple[float, float]
+) -> None:
+    limits, ways = AxisLimits(-270.0, 270.0, *drive), []
+    for speed_deg_s in (0.3, 0.8):
+        az, rate, el = zenith_path(top_deg, speed_deg_s, 0.0)
+        for sign in (1.0, -1.0):
+            to_zenith = (sign * az, el, sign * rate, np.gradient(el, STEP_S))
+            ways.append(way_over(Branches(*to_zenith, sign * (az - 180.0), 180.0 - el, STEP_S), limits, 0.5))
+    for plain, other in zip(ways[::2], ways[1::2], strict=True):
+        assert (plain is None) == (other is None)
+        if plain is None or other is None:
+            continue
+        assert np.allclose(other.az_deg, -plain.az_deg, atol=1e-9)
+        assert np.allclose(other.el_deg, plain.el_deg, atol=1e-9)
+        assert other.crossing.departure_tai_s == plain.crossing.departure_tai_s
+        t = STEP_S * np.arange(plain.az_deg.size)
+        is_way = (t > plain.crossing.departure_tai_s) & (t < plain.crossing.return_tai_s)
+        assert np.abs(plain.az_rate_deg_s[is_way]).max() <= RATE_SHARE * limits.max_rate_deg_s + 1e-6
 
 
 @given(st.floats(20.0, 89.9), st.floats(0.2, 1.0), st.floats(-25.0, 25.0), bearings, ranges, st.floats(-300.0, 300.0))

@@ -90,6 +90,21 @@ def test_a_half_of_a_late_answer_and_the_rest_of_it_are_not_the_next_polls() -> 
     assert (reply.az_deg, reply.el_deg) == (11.0, 21.0)
 
 
+@pytest.mark.parametrize("before", [b"10.0\n", b"10.0\n2", b"-170.25\r\n"])
+@pytest.mark.parametrize("command", [PointAt(1.0, 2.0), Stop()])
+@pytest.mark.parametrize("code", [0, -9])
+def test_a_report_after_half_a_position_is_the_next_commands(before: bytes, command: PointAt | Stop, code: int) -> None:
+    driver = RotctlDriver()
+    driver.begin(Poll(), 0.0)
+    assert driver.receive(before, 0.5) is None
+    driver.fail(1.0)
+    driver.begin(command, 1.1)
+    rest = b"" if before.endswith(b"\n") else b"\n"
+    assert driver.receive(rest, 1.15) is None
+    assert driver.receive(f"RPRT {code}\n".encode(), 1.2) == (Done() if code == 0 else REJECTED)
+    assert not driver.is_outstanding
+
+
 def test_an_answer_that_was_lost_does_not_hold_up_the_next_one() -> None:
     driver = RotctlDriver()
     driver.begin(PointAt(1.0, 2.0), 0.0)

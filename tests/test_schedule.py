@@ -204,3 +204,15 @@ def test_priority_nought_fills_a_gap_and_takes_nothing_from_others():
         track("LATE", 2000.0, priority=0),
     ]
     assert [one.track.satellite for one in best_slots(tracks, RULES)] == ["SMALL", "LATE"]
+
+
+@pytest.mark.parametrize("first", list(Wish))
+@pytest.mark.parametrize("last", list(Wish))
+def test_of_two_words_about_a_pass_the_newer_one_counts(first: Wish, last: Wish) -> None:
+    tracks = [track("A", 0.0, priority=9), track("B", 300.0, priority=1), track("C", 5000.0)]
+    for name, at_s in (("A", 300.0), ("B", 600.0), ("C", 5300.0)):
+        words = [PassRequest(name, DAY + at_s, wish) for wish in (first, last)]
+        both, alone = (decide(tracks, replace(RULES, requests=tuple(said))) for said in (words, words[1:]))
+        assert [(one.track.satellite, one.slot, one.reason) for one in both] == [
+            (one.track.satellite, one.slot, one.reason) for one in alone
+        ]

@@ -23,6 +23,21 @@ def test_above_either_limit_the_antenna_is_to_be_stowed(speeds, wants_stow):
     assert state.wind is (Wind.STRONG if wants_stow else Wind.CALM)
 
 
+@pytest.mark.parametrize("when_stale", ["go_on", "stow"])
+@pytest.mark.parametrize("is_strong", [False, True])
+def test_a_stale_wind_that_is_let_go_stays_so_until_it_is_heard_again(when_stale, is_strong):
+    rules, speeds = WindRules(when_stale=when_stale), (20.0, 25.0) if is_strong else (2.0, 3.0)
+    stale = blow([speeds, None, None], rules)[-1]
+    assert stale.wants_stow is (is_strong or when_stale == "stow")
+    state = WindWatch(wind=stale.wind, newest=stale.newest, is_let_go=True)
+    for minute in range(4, 9):
+        state = watch(state, None, rules, 60.0 * minute)
+        assert (state.wind, state.wants_stow) == (Wind.STALE, False)
+    for minute, heard in ((9, WindSample(20.0, 25.0, 540.0)), (12, None)):
+        state = watch(state, heard, rules, 60.0 * minute)
+        assert state.wants_stow
+
+
 def test_it_may_move_again_after_ten_minutes_well_below_both_limits_and_not_before():
     states = blow([(12.0, 12.0), *[(8.8, 13.5)] * 11])
     assert [one.wants_stow for one in states] == [True] * 11 + [False]
