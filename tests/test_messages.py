@@ -165,6 +165,16 @@ def test_surveyed_terms_are_taken_out_names_are_ascii_and_a_gap_or_no_signal_is_
     assert tdm_text([reading(0.0, 1.0, is_acquired=False)], "S", "Sat", Mount(), None, SENDER) == ""
 
 
+def test_a_segment_lasts_as_long_as_its_quality_and_the_line() -> None:
+    """However long that is; a gap of less than five seconds ends none."""
+    ends_s = [(0.0, 30.0, True), (34.9, 60.0, True), (65.1, 80.0, True), (80.1, 95.0, False), (95.1, 96.0, True)]
+    spells = [(first + 0.1 * np.arange(round(10.0 * (last - first)) + 1), lock) for first, last, lock in ends_s]
+    readings = [reading(float(t), 20.0, is_acquired=lock) for times, lock in spells for t in times]
+    segments = check_rules(tdm_text(readings, "S", "Sat", Mount(), None, SENDER))
+    assert [len(one["values"]["ANGLE_1"]) for one in segments] == [301 + 252, 150, 150, 10]
+    assert [one["meta"]["DATA_QUALITY"] for one in segments] == ["VALIDATED", "VALIDATED", "DEGRADED", "VALIDATED"]
+
+
 # OMM
 
 

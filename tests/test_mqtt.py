@@ -4,13 +4,16 @@ import asyncio
 import contextlib
 import json
 import os
+import re
 import shutil
 import signal
 import socket
 import subprocess
 import time
+from ast import literal_eval
 from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass, field, replace
+from operator import eq, gt, lt, ne
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +65,36 @@ def test_home_assistant_finds_a_device_whose_sensors_are_keys_of_the_state() -> 
     assert len({told["unique_id"] for told in found.values()}) == len(found)
     azimuth = found["homeassistant/sensor/site_dish/az_deg/config"]
     assert (azimuth["unit_of_measurement"], azimuth["suggested_display_precision"]) == ("°", 2)
+
+
+def value_of(template: str, state: dict[str, Any]) -> str:
+    """What a template of the form `'ON' if value_json.KEY [| length] [operator literal] else 'OFF'` makes of a state."""
+    found = re.fullmatch(
+        r"{{ '(\w+)' if value_json\.(\w+)( \| length)?(?: (!=|==|>|<) (\S+))? else '(\w+)' }}", template
+    )
+    assert found is not None, template
+    then, key, length, operator, literal, otherwise = found.groups()
+    value = len(state[key]) if length else state[key]
+    if operator:
+        compare = {"!=": ne, "==": eq, ">": gt, "<": lt}[operator]
+        value = compare(value, literal_eval(literal))
+    return then if value else otherwise
+
+
+def test_a_sensor_that_is_on_or_off_is_so_as_the_snapshot_says() -> None:
+    good = replace(SEEN, is_link_up=True, is_acquired=False, latch="")
+    made = [json.loads(message.payload) for message in discovery(TOPICS, "homeassistant") if "binary" in message.topic]
+    assert len(made) == 4
+    for change, changed in (
+        ({}, {}),
+        ({"is_link_up": False}, {"site_dish_is_link_up": "OFF", "site_dish_alarms": "ON"}),
+        ({"is_acquired": True}, {"site_dish_is_acquired": "ON"}),
+        ({"latch": "azimuth"}, {"site_dish_latch": "ON", "site_dish_alarms": "ON"}),
+    ):
+        state = json.loads(TOPICS.state(replace(good, **change)).payload)
+        shown = {told["unique_id"]: value_of(told["value_template"], state) for told in made}
+        calm = {"is_link_up": "ON", "is_acquired": "OFF", "latch": "OFF", "alarms": "OFF"}
+        assert shown == {f"site_dish_{key}": value for key, value in calm.items()} | changed
 
 
 # Configuration
