@@ -19,12 +19,14 @@ from acu_daemon.assist.session.refit import RefitReply, RefitRequest
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.edge import recording as recording_file
 from acu_daemon.edge.arrivals import MAX_WAITING_BYTES, Arrivals
+from acu_daemon.edge.fetch_policy import Came, FetchOutcome, FetchState, after
 from acu_daemon.edge.fit import FitDiedError, FitFailedError, InlineFitRunner
 from acu_daemon.edge.latch import LatchKeeper
 from acu_daemon.edge.recording import RecordingWriter
 from acu_daemon.edge.writer import Writer
 from acu_daemon.model import Reading, Readings
 
+NOW, EVERY_S = 8.4e8, 7200.0
 DIES, FAILS, FITS = FitDiedError("dead"), FitFailedError("no fit"), None
 
 
@@ -79,6 +81,25 @@ def test_p10_each_time_a_recording_goes_on_it_tells_what_was_lost_since_the_last
             is_full = tick in (5, 6, 7, 20, 21)
             recording.add(Reading(100.0 + tick, 1.0, 2.0, True))
     assert [log.get("lost_count") for log in logs] == [None, 3, None, 2]
+
+
+@pytest.mark.parametrize("good", [Came.GOOD, Came.UNCHANGED])
+@pytest.mark.parametrize("bad", [Came.FAILED, Came.UNUSABLE])
+def test_a_server_that_answered_well_in_between_is_asked_again_as_after_a_first_failure(good: Came, bad: Came) -> None:
+    def pauses_s(script: list[Came]) -> list[float]:
+        state, now, found = FetchState("http://x"), NOW, []
+        for came in script:
+            state = after(state, FetchOutcome(came, "" if came is good else "no"), now, EVERY_S)
+            found.append(state.next_tai_s - now)
+            assert bool(state.problem) is (came is bad)
+            now = state.next_tai_s
+        return found
+
+    first, second, third = pauses_s([bad] * 3)
+    assert first < second < third
+    assert pauses_s([bad, bad, good, bad, good, good, bad, bad]) == [
+        *(first, second, EVERY_S, first, EVERY_S, EVERY_S, first, second)
+    ]
 
 
 def test_each_time_a_queue_is_empty_again_it_tells_what_was_dropped_since_the_last_time() -> None:

@@ -18,7 +18,15 @@ from acu_daemon.onboard.gimbal_frames import (
     roll_pitch_to,
 )
 from acu_daemon.onboard.scenarios import DAEJEON
-from acu_daemon.onboard.view import PassView, gimbal_from_itrs, ground_points_itrs_m, off_pointing_deg, view_pass
+from acu_daemon.onboard.view import (
+    FINE_S,
+    PER_PLAN_STEP,
+    PassView,
+    gimbal_from_itrs,
+    ground_points_itrs_m,
+    off_pointing_deg,
+    view_pass,
+)
 from acu_daemon.orbit.frames import station_itrs_m
 from acu_daemon.orbit.timescales import utc_days
 from acu_daemon.units import DAY_S
@@ -103,3 +111,20 @@ def test_a_point_on_the_ground_is_as_far_off_as_its_distance_over_the_range_says
     off = off_pointing_deg(view, here, point)[:, 0]
     a, b = view.unit(here), view.unit(point[0])
     assert off == pytest.approx(angles_between_deg(a, b), abs=1e-9)
+
+
+@pytest.mark.parametrize("from_s", [0.0, 0.001, 0.4, 0.999])
+@pytest.mark.parametrize("for_s", [20.0, 20.1, 20.249, 20.251])
+def test_a_view_lies_within_its_pass_from_the_first_whole_second_on_and_ends_less_than_a_plan_step_before_it(
+    from_s: float, for_s: float
+) -> None:
+    scenario = made_scenario(0, "nadir")
+    begin = np.floor(scenario.seen.rise_tai_s) + 1.0 + from_s
+    view = view_pass(
+        *(scenario.propagator, scenario.attitude, np.eye(3), EarthOrientation()), begin, begin + for_s
+    )  # fmt: skip
+    assert begin <= view.tai_s[0] < begin + 1.0
+    assert view.tai_s[0] == np.floor(view.tai_s[0])
+    assert begin + for_s - PER_PLAN_STEP * FINE_S < view.tai_s[-1] <= begin + for_s
+    assert view.time_s.size % PER_PLAN_STEP == 1
+    assert view.step_s == pytest.approx(FINE_S)

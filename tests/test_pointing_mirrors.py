@@ -6,14 +6,20 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from memories import remembering
 from mirrors import MIRRORS, Mirror
 from test_search import straight_path
 
+from acu_daemon.acu.commands import AcuMode, Backup
+from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.turn import TurnWatch, is_pulled_round, watch_goal
-from acu_daemon.control.state import Scan
+from acu_daemon.control.state import Scan, StartStage
+from acu_daemon.control.tick_input import Sky
+from acu_daemon.control.tracking.aim import AHEAD_DEG_S, aim
 from acu_daemon.control.tracking.approach import way_s
 from acu_daemon.control.tracking.scan import go_on, pace_s_s, pointing
+from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.model import AxisLimits, Model, Reading
 from acu_daemon.pointing.axis import AxisState, step
 from acu_daemon.pointing.envelope import Envelope
@@ -221,6 +227,24 @@ def test_a_row_of_the_search_is_mirrored_with_its_path(
         other = go_on(other, other_path, mirror.reading(reading), t, STEP_S, other_config)
         assert (other.side, other.row, other.is_moving) == (scan.side, -scan.row, scan.is_moving)
         assert other.along_s == pytest.approx(scan.along_s, abs=1e-6)
+
+
+@pytest.mark.parametrize("az_rate_deg_s", [-3.0, -0.02, -0.001, 0.0, 0.001, 0.02, 3.0])
+@pytest.mark.parametrize("el_rate_deg_s", [-1.0, -0.02, -0.001, 0.0, 0.001, 0.02, 1.0])
+def test_a_rotator_is_told_half_its_dead_band_more_whichever_way_each_axis_goes(
+    az_rate_deg_s: float, el_rate_deg_s: float
+) -> None:
+    config = ControlConfig(Envelope(AxisLimits(-270.0, 270.0, 5.0, 10.0), AxisLimits(0.0, 90.0, 5.0, 5.0)))
+    waits = replace(config, acu=replace(config.acu, dead_band_deg=0.6))
+    path = replace(straight_path(40.0, el_rate_deg_s, az_rate_deg_s), kind="FITTED")
+    seen = AcuStatus(260.0, 40.0, AcuMode.REMOTE_BACKUP, backup_selected=Backup.REMOTE)
+    state = remembering(track=TrackState.HOLD_FITTED, stage=StartStage.READY, status=seen, az_deg=-100.0)
+    plain, aimed = (aim(state, Sky(path, None, None), 0.0, one) for one in (config, waits))
+    for rate_deg_s, more_deg in (
+        (plain.az_rate_deg_s, aimed.az_deg - plain.az_deg),
+        (plain.el_rate_deg_s, aimed.el_deg - plain.el_deg),
+    ):
+        assert more_deg == pytest.approx(0.3 * np.sign(rate_deg_s) * (abs(rate_deg_s) >= AHEAD_DEG_S))
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
