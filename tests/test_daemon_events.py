@@ -49,6 +49,7 @@ from acu_daemon.edge.clock import LoopClock
 from acu_daemon.edge.fit import START_S, FitDiedError, FitFailedError, InlineFitRunner
 from acu_daemon.errors import NoAcuError, UsageError
 from acu_daemon.model import Model
+from acu_daemon.orbit.timescales import tai_from_utc
 from acu_daemon.sim.acu import FakeAcu
 from acu_daemon.sim.scenario import AcuChoice, SkyErrors
 
@@ -777,6 +778,9 @@ def test_the_end_of_the_pass_ends_the_run() -> None:
     late_s = [seen.along_s for seen in flight.snapshots if seen.along_s is not None][-1]
     assert late_s == pytest.approx(WRONG_ORBIT.along_track_s, abs=1.5)  # all that 20 s at 5 deg elevation tell
     assert flight.commands[-1][0] == pytest.approx(coming.set_tai_s + 1.0 + late_s, abs=0.2)
+    for seen in flight.snapshots:
+        assert seen.set_in_s == pytest.approx(coming.set_tai_s + (seen.along_s or 0.0) - seen.tai_s, abs=1e-3)
+        assert tai_from_utc(seen.set_utc) == pytest.approx(seen.tai_s + seen.set_in_s, abs=0.51)  # whole seconds
 
 
 def test_an_antenna_that_autotracks_long_before_the_pass_is_left_to_whoever_uses_it() -> None:

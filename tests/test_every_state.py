@@ -154,6 +154,28 @@ def test_a_bias_that_is_known_alone_is_taken_away_with_its_sign(state: int, sign
     assert sky_angles_deg(left.az_deg, left.el_deg, seen.az_deg, seen.el_deg).max() < 0.2 * added_deg  # to its square
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("state", [*range(6, 10), *range(13, 17)], ids=lambda one: NAMES[one])
+def test_a_bias_that_alone_is_open_is_found_with_its_sign_from_beyond_the_zenith(state: int, sign: float):
+    x = np.zeros(STATE_COUNT)
+    x[state] = sign * SIGMAS[state]
+    tai_s = visible(SOURCE, GIVEN, 1.0)
+    truth = FitResult("full", Correction(), float(tai_s[0]), 9, 0, 0.0, 0.0, 0.0, bias=bias_of(x))
+    beyond = encoder_look(SOURCE, tai_s, GIVEN, truth, is_plunged=True)
+    assert beyond.el_deg.min() > 90.0
+    found = found_of(fit_of(Readings(tai_s, beyond.az_deg, beyond.el_deg), settings({state})))
+    assert found[state] == pytest.approx(x[state], rel=0.05)
+
+
+@pytest.mark.parametrize("uncertainty_m", [0.0, 30.0, 1000.0])
+def test_how_well_a_station_is_known_is_shared_by_east_and_north_and_little_of_it_is_up(uncertainty_m: float):
+    target = demo_target(station={"uncertainty_m": uncertainty_m})
+    covariance = make_prior(SOURCE, estimator_settings(target.station, target.satellite), EPOCH_TAI_S).covariance
+    east_m, north_m, up_m = np.sqrt(np.diag(covariance))[10:13]
+    assert np.hypot(east_m, north_m) == pytest.approx(uncertainty_m)
+    assert (east_m, up_m) == pytest.approx((north_m, 0.1 * north_m))
+
+
 def test_every_sigma_of_a_survey_goes_to_its_own_state():
     surveyed = {f"{name}_sigma_deg": 0.01 * k for k, name in enumerate(("ia", "ca", "ie", "npae", "an", "aw", "tf"), 1)}
     target = demo_target(mount=surveyed)

@@ -13,7 +13,15 @@ from acu_daemon.groundtrack.control_loop import BLOCK_STEPS, fly
 from acu_daemon.groundtrack.environment import STEP_S, even_steps, free_motion
 from acu_daemon.groundtrack.gps import FIX_S, FIXES, NO_STEERING, GpsReceiver, Ripple, TrueOrbit
 from acu_daemon.groundtrack.navigator import Navigator, NavigatorSetup, drift_of
-from acu_daemon.groundtrack.our_controller import DriftFilter, Forecast
+from acu_daemon.groundtrack.our_controller import (
+    DECIDING_SIGMAS,
+    NOISE_M,
+    OBSERVATIONS,
+    DriftFilter,
+    Forecast,
+    OurController,
+    OurSettings,
+)
 from acu_daemon.groundtrack.paper_controller import PaperController, PaperSettings
 from acu_daemon.groundtrack.paper_navigator import PaperNavigator
 from acu_daemon.groundtrack.simulate import Case, bound_count, drag_less_lunisolar_m, simulate
@@ -133,6 +141,26 @@ def test_the_papers_controller_waits_for_its_windows_and_aims_at_the_lower_limit
     lowest_m = 150.0 - change_m_s**2 / (2.0 * acceleration)
     assert lowest_m == pytest.approx(-100.0, abs=5.0)  # eq 13 is 0.5 % too large
     assert sum(size > 0.0 for _, size in sizes[first : first + 500]) == 0
+
+
+@pytest.mark.parametrize("drift_m_hour", [5.0, 20.0, 60.0])
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_a_manoeuvre_is_made_before_the_upper_limit_and_not_hours_before(drift_m_hour: float, share: float) -> None:
+    """However fast D drifts, and wherever between two decisions it comes to the limit."""
+    per_step_m, count = drift_m_hour / OBSERVATIONS, 4000
+    drag = np.full(count, 40.0 / DAY_S**2)
+    controller = OurController(OurSettings(300.0, -300.0), CRAFT.reference, Forecast(STEP_S, drag, np.zeros(count)))
+    first_m = 300.0 - (60.0 + share) * drift_m_hour
+    pushed_at_m = None
+    for k in range(1, 80 * OBSERVATIONS):
+        d_m = first_m + per_step_m * k + 0.5 * drag[0] * (k * STEP_S) ** 2
+        if controller.observe(k, d_m) > 0.0:
+            pushed_at_m = d_m
+            break
+    assert pushed_at_m is not None
+    hour_m = drift_m_hour + drag[0] * k * STEP_S * OBSERVATIONS * STEP_S
+    sigma_m = DECIDING_SIGMAS * NOISE_M
+    assert 300.0 - sigma_m - 2.0 * hour_m < pushed_at_m < 300.0
 
 
 def test_a_steered_orbit_follows_the_parabola_of_the_bound() -> None:

@@ -326,6 +326,21 @@ def test_what_the_next_passes_say_of_it_re_zeroes_the_memory_and_it_goes_on_from
     assert memory.mount.mean[0] / DEG == pytest.approx(CROOKED.ia_deg - 0.2, abs=0.03)
 
 
+def test_a_doubt_that_is_no_proof_alone_counts_with_the_next_ones(crooked: PedestalMemory) -> None:
+    one = passes(CROOKED, LAST + 1)[-1]
+    shift_rad, information = 0.3 * DEG, 15.0 / (0.3 * DEG) ** 2  # nearly four sigmas
+    doubt = Doubt(np.array([0.0, information * shift_rad]), information * np.eye(2))
+    seen = replace(estimate_of(one, read(one, 7), crooked), doubt=doubt)
+    first = updated(crooked, seen, SETTINGS)
+    assert "re-zeroed" in first.why_not
+    assert first.shift_deg is None
+    second = updated(first.memory, seen, SETTINGS)
+    assert second.shift_deg is not None
+    assert second.shift_deg == pytest.approx((0.0, 0.3), abs=0.01)
+    calm = updated(first.memory, replace(seen, doubt=Doubt(np.zeros(2), np.zeros((2, 2)))), SETTINGS)
+    assert (calm.shift_deg, calm.why_not) == (None, "")
+
+
 def test_no_pass_of_the_same_mount_is_taken_for_re_zeroed_encoders() -> None:
     for axes in (CROOKED, SQUARE):
         _, told = remembered(axes, 6, first_seed=20)

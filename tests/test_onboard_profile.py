@@ -373,3 +373,22 @@ def test_a_boresight_turned_away_from_the_axis_reaches_further_out() -> None:
 def test_backlash_that_takes_all_of_the_margin_is_refused() -> None:
     with pytest.raises(ProfileError, match="widen margin_deg"):
         make(made_task(0, 0.1), DAEJEON, "free", "peak", Backlash(0.2, 0.2))
+
+
+@pytest.mark.parametrize("beside_deg", [-1.9, -0.5, 0.5, 1.9])
+@pytest.mark.parametrize("course_deg", [0.0, 77.0, 190.0, 300.0])
+def test_past_the_axis_one_winding_goes_the_short_way_and_the_other_one_round_the_other_side(
+    beside_deg: float, course_deg: float
+) -> None:
+    """A straight line that passes the axis within the margin, on either side."""
+    time_s = np.linspace(-60.0, 60.0, 1201)
+    far_deg = np.hypot(time_s, beside_deg)
+    az_deg = course_deg + np.degrees(np.unwrap(np.arctan2(beside_deg * np.ones_like(time_s), time_s)))
+    tube = azimuth_tube(Cone(2.5), time_s, az_deg, far_deg)
+    direct, other = windings(tube, az_deg)
+    ends = [(one.lower_deg[[0, -1]] + one.upper_deg[[0, -1]]) / 2.0 for one in (direct, other)]
+    short_deg, long_deg = (float(last - first) for first, last in ends)
+    assert short_deg == pytest.approx(az_deg[-1] - az_deg[0], abs=0.1)
+    assert abs(short_deg) < 180.0 < abs(long_deg)
+    assert short_deg * long_deg < 0.0
+    assert abs(short_deg) + abs(long_deg) == pytest.approx(360.0)

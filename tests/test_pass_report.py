@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import cache
 from html import unescape
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -16,7 +17,11 @@ from command_line import acu_daemon
 from fault_tapes import TROUBLES, path_of
 from flights import climb
 
+from acu_daemon.acu.commands import Poll
 from acu_daemon.cli.report_command import make_report, write_index
+from acu_daemon.control.orders import Orders
+from acu_daemon.control.state import ControlState
+from acu_daemon.control.tick_input import PassPlan, Sky
 from acu_daemon.edge.tape_file import SUFFIX
 from acu_daemon.report.pass_losses import losses_of
 from acu_daemon.report.pass_page import pass_page, verdict_of
@@ -221,6 +226,14 @@ def test_a_browser_without_a_network_shows_the_page(folder: Path) -> None:
 def seen(t_s: float, is_acquired: bool, has_signal: bool | None = None, state: str = "HOLD/FITTED") -> SeenReading:
     signal = is_acquired if has_signal is None else has_signal
     return SeenReading(t_s, 10.0, 20.0, signal, is_acquired, None, state, 0.1 * t_s, None)
+
+
+def test_the_plan_of_the_report_is_the_one_with_which_the_pass_began() -> None:
+    first, later = PassPlan(1.0, 2.0, 0.0, 3.0, 4.0), PassPlan(1.5, 2.0, 0.0, 3.0, 4.0)
+    watch, state, orders = PassWatch(), ControlState(), Orders(Poll())
+    for plan in (None, first, later, None):
+        watch.ticked(SimpleNamespace(state=state, sky=Sky(None, None, plan)), 0.0, orders)  # type: ignore[arg-type]
+    assert watch.plan is first
 
 
 def test_a_loss_ends_when_the_signal_is_back_and_relock_is_what_autotrack_took_from_there() -> None:
