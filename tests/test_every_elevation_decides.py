@@ -232,7 +232,9 @@ def test_a_glance_is_short_where_the_time_in_doubt_is_more_than_half_a_beam_on_t
     for share, is_short in ((0.9, False), (1.1, True)):
         late_s = share * CONFIG.beamwidth_deg / 2.0 / SKY_DEG_S / SIGMAS
         path = replace(great_circle(el_deg, course_deg), spread=(late_s, 0.0))
-        found = causes(path, place, TrackState.ACQUIRE_TLE, SELECTED, 50.0, in_state_s=GLANCE_S[TrackState.ACQUIRE_TLE] + 1.0)
+        found = causes(
+            path, place, TrackState.ACQUIRE_TLE, SELECTED, 50.0, in_state_s=GLANCE_S[TrackState.ACQUIRE_TLE] + 1.0
+        )
         assert (Cause.ACQUIRE_OVER in found) == is_short
 
 

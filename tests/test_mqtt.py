@@ -68,7 +68,7 @@ def test_home_assistant_finds_a_device_whose_sensors_are_keys_of_the_state() -> 
 
 
 def value_of(template: str, state: dict[str, Any]) -> str:
-    """What a template of the form `'ON' if value_json.KEY [| length] [operator literal] else 'OFF'` makes of a state."""
+    """What a template makes of a state: `ON if value_json.KEY [| length] [operator literal] else OFF`, quoted."""
     found = re.fullmatch(
         r"{{ '(\w+)' if value_json\.(\w+)( \| length)?(?: (!=|==|>|<) (\S+))? else '(\w+)' }}", template
     )
