@@ -157,7 +157,8 @@ def run_week(config: Path, state: Path, begin_tai_s: float, days: int) -> Week:
 def happenings(config: Path, begin_tai_s: float, days: int) -> list[tuple[float, Action]]:
     """Wind in a pass of the second day, a reload on the third, a pause on the fourth; of fewer days on the last."""
     at = [begin_tai_s + min(day, days - 1) * DAY_S for day in (1, 2, 3)]
-    windy_tai_s = _middle_of_a_pass(config, at[0] + 3600.0, at[0] + 2.0 * DAY_S) or at[0]
+    calm_s = 3600.0 if days > 1 else 14400.0  # of one day, not in the pass of the kill
+    windy_tai_s = _middle_of_a_pass(config, at[0] + calm_s, at[0] + 2.0 * DAY_S) or at[0]
     pause_tai_s = at[2] + 36000.0
     told = [begin_tai_s + at_s for at_s in range(0, round(days * DAY_S), TELL_S)]
     winds = [(tai_s, STRONG if 0.0 <= tai_s - windy_tai_s < WIND_S else CALM) for tai_s in told]

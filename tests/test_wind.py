@@ -2,6 +2,7 @@
 
 import pytest
 
+from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.schedule.wind import Wind, WindRules, WindSample, WindWatch, watch
 
 RULES = WindRules()
@@ -42,6 +43,7 @@ def test_it_may_move_again_after_ten_minutes_well_below_both_limits_and_not_befo
     states = blow([(12.0, 12.0), *[(8.8, 13.5)] * 11])
     assert [one.wants_stow for one in states] == [True] * 11 + [False]
     assert states[-1].wind is Wind.CALM
+    assert states[5].words == f"wind strong, mean 8.8 m/s, gusts 13.5 m/s, stow, calm since {utc_text(120.0, 0)[11:19]}"
 
 
 @pytest.mark.parametrize("between", [(9.0, 10.0), (5.0, 14.0), (12.0, 1.0), None])

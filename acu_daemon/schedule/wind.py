@@ -11,6 +11,8 @@ from enum import StrEnum
 from math import inf, isfinite
 from typing import Literal
 
+from acu_daemon.orbit.timescales import utc_text
+
 MOST_M_S = 150.0  # more is no wind
 
 
@@ -66,7 +68,8 @@ class WindWatch:
             return ""
         seen = self.newest
         said = "" if seen is None else f", mean {seen.mean_m_s:.1f} m/s, gusts {seen.gust_m_s:.1f} m/s"
-        return f"wind {self.wind}{said}{', stow' if self.wants_stow else ''}"
+        calm = f", calm since {utc_text(self.calm_since_tai_s, 0)[11:19]}" if isfinite(self.calm_since_tai_s) else ""
+        return f"wind {self.wind}{said}{', stow' if self.wants_stow else ''}{calm}"
 
 
 def watch(before: WindWatch, sample: WindSample | None, rules: WindRules, now_tai_s: float) -> WindWatch:
