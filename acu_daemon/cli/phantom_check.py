@@ -23,9 +23,9 @@ Bearing = tuple[float, float]  # azimuth 0 to 360, and elevation, encoder frame
 class PhantomCheck:
     """Owned by the loop.  found: of the entry that was looked at last; None: not flown, or it could not be."""
 
-    def __init__(self, config: Path, directory: Path, beside: Beside = apart) -> None:
-        """beside: does what takes seconds; a thread would make each tick late meanwhile."""
-        self._config, self._directory, self._beside = config, directory, beside
+    def __init__(self, config: Path, directory: Path, beside: Beside, fly_beside: Beside = apart) -> None:
+        """beside: reads the files.  fly_beside: flies, for seconds; a thread would make each tick late meanwhile."""
+        self._config, self._directory, self._beside, self._fly_beside = config, directory, beside, fly_beside
         self._number = 0
         self._flying: asyncio.Task[PhantomPass] | None = None
         self.found: PhantomPass | None = None
@@ -38,7 +38,7 @@ class PhantomCheck:
             self.close()
             self._number, self.found = entry.number, None
             given = self._config, self._directory, entry, now_tai_s, place
-            self._flying = asyncio.create_task(self._beside(fly, *given), name="phantom")
+            self._flying = asyncio.create_task(self._fly(*given), name="phantom")
         if self._flying is None or not self._flying.done():
             return
         flown, self._flying = self._flying, None
@@ -64,6 +64,11 @@ class PhantomCheck:
         """What was found, for people."""
         return "" if self.found is None else str(self.found)
 
+    async def _fly(self, *given: Any) -> PhantomPass:
+        """Raises: AcuDaemonError: of files or elements, or of the process."""
+        flown: PhantomPass = await self._fly_beside(fly_phantom, *await self._beside(what_to_fly, *given))
+        return flown
+
     def close(self) -> None:
         """End what runs beside the loop."""
         if self._flying is not None:
@@ -71,15 +76,15 @@ class PhantomCheck:
             self._flying = None
 
 
-def fly(config: Path, directory: Path, entry: Entry, now_tai_s: float, place: Bearing) -> PhantomPass:
-    """Fly the pass of an entry from where the antenna stands.  Raises: AcuDaemonError: of files or elements."""
+def what_to_fly(config: Path, directory: Path, entry: Entry, now_tai_s: float, place: Bearing) -> tuple[Any, ...]:
+    """What fly_phantom is given for an entry.  Raises: AcuDaemonError: of files or elements."""
     target = load_target(config, entry.satellite, now_tai_s, at_tai_s=entry.rise_tai_s, folders=(directory,))
     station, azimuth = target.station, target.station.acu.azimuth.limits()
     near_deg = middle_deg(azimuth) if entry.start_az_deg is None else entry.start_az_deg
     turned_deg = nearest_turn(place[0], near_deg, azimuth)
     coming = coming_pass(target, max(now_tai_s, entry.rise_tai_s - 60.0))
     tilt = planned_tilt(station, target.elements.propagator, coming)
-    return fly_phantom(
+    return (
         target.elements.propagator,
         leaning(station.site, tilt),
         coming,

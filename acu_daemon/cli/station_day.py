@@ -82,7 +82,7 @@ class StationDay:
         self.keeper = ScheduleKeeper(config, clock, file, station, beside, self._tally)
         self.course = PassCourse(self.keeper, self.hooks, self.about)
         self.checks = PassChecks(check or self._no_gos, beside, self._tell_no_go)
-        self.phantom = PhantomCheck(config, self._directory, fly_beside) if has_phantom else None
+        self.phantom = PhantomCheck(config, self._directory, beside, fly_beside) if has_phantom else None
         self._place: tuple[float, float] | None = None  # of the newest reading
         self._next_rise = NextRise(config, self._directory, beside)
         self.wind = StationWind(station.wind, config, beside)
