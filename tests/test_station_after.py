@@ -13,9 +13,11 @@ LATER = replaced(BROUWER, "SCD-1", "SCD-9").replace("mean_anomaly_deg = 350.56",
 SETS_S, RISES_S = 330.0, 773.0  # of the first pass and of the second one, after START, about
 
 
-def days(directory: Path, after: str, until_s: float, script: list[tuple[float, Action]] | None = None) -> Days:
+def days(
+    directory: Path, after: str, until_s: float, script: list[tuple[float, Action]] | None = None, later: str = LATER
+) -> Days:
     station = f'{HIGH}[schedule]\nafter = "{after}"\nnext_within_s = 60\n'
-    config, state = write(directory / "config", station, scd=BROUWER + FIRST, later=LATER + SHORT), directory / "state"
+    config, state = write(directory / "config", station, scd=BROUWER + FIRST, later=later + SHORT), directory / "state"
     state.mkdir()
     return run_days(config, state, START + 260.0, START + until_s, script=script or [])
 
@@ -48,3 +50,13 @@ def test_stow_is_the_schedules_and_the_next_pass_ends_it(tmp_path: Path) -> None
     assert modes(found, SETS_S + 30.0, RISES_S - 150.0) == {AcuMode.STOWED}
     assert found.rows[-1].mode is AcuMode.REMOTE
     assert [one["by"] for one in found.named("stow.begins")] == ["schedule"]
+
+
+def test_a_pass_that_is_due_on_the_way_to_the_stow_begins_once_it_is_reached_and_takes_it_for_nobodys(
+    tmp_path: Path,
+) -> None:
+    soon = LATER.replace("mean_anomaly_deg = 320.0", "mean_anomaly_deg = 338.0")
+    found = days(tmp_path, "stow", SETS_S + 150.0, later=soon)
+    assert AcuMode.STOWING in modes(found, SETS_S, SETS_S + 60.0)
+    assert [one["by"] for one in found.named("stow.begins")] == ["schedule"]
+    assert found.rows[-1].mode in (AcuMode.REMOTE, AcuMode.AUTOTRACK)

@@ -14,6 +14,7 @@ from typing import Any
 
 import structlog
 
+from acu_daemon.acu.commands import AcuMode
 from acu_daemon.cli.check import findings
 from acu_daemon.cli.check_finding import NO_GO
 from acu_daemon.cli.check_hooks import HOOKS
@@ -43,6 +44,7 @@ from acu_daemon.model import Pass
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.schedule.book import Entry, PassState
 
+STOW_SEEN_S = 3.0  # after STOW the status shows it, or it is not sent
 SPARE_S = 5.0  # for the start of a pass' run
 BEGINS = " begins"  # behind a pass' name: why a run ends
 
@@ -87,6 +89,7 @@ class StationDay:
         self._next_rise = NextRise(config, self._directory, beside)
         self.wind = StationWind(station.wind, config, beside)
         self.stow_by = StowBy.NOBODY
+        self._is_stowing, self._stow_asked_tai_s = False, -math.inf
         self.fetching = ElementsFetching(config, station.elements, clock, is_rehearsal=is_rehearsal, on_asked=on_asked)
 
     @property
@@ -140,10 +143,22 @@ class StationDay:
                 self.phantom.look(entry, now_tai_s, self._place)
         if entry.start_tai_s - now_tai_s > self._lead_s(entry) or not self.checks.may_begin(now_tai_s):
             return ""
+        if self.is_going_to_stow:
+            return ""
         if why := self._why_not_now(entry):
             self._refuse(entry, now_tai_s, why)
             return ""
         return f"{entry.name}{BEGINS}"
+
+    @property
+    def is_going_to_stow(self) -> bool:
+        """Whether the antenna is on its way to the schedule's stow: a run that began now would think it another's."""
+        is_just_asked = 0.0 <= self._clock.tai_s() - self._stow_asked_tai_s < STOW_SEEN_S
+        return is_just_asked or (self._is_stowing and self.stow_by is StowBy.SCHEDULE)
+
+    def stow_is_asked(self) -> None:
+        """The antenna is sent to the stow, and no status shows it yet."""
+        self._stow_asked_tai_s = self._clock.tai_s()
 
     def _why_not_now(self, entry: Entry) -> str:
         if self.wind.seen.wants_stow:
@@ -201,6 +216,7 @@ class StationDay:
     def see(self, seen: Snapshot) -> None:
         """Take the newest snapshot, of a pass or between passes."""
         self.stow_by = StowBy(seen.stow_by)
+        self._is_stowing = seen.acu_mode == AcuMode.STOWING.name
         if seen.az_deg is not None and seen.el_deg is not None:
             self._place = seen.az_deg, seen.el_deg
         self.course.see(seen)

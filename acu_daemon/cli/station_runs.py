@@ -165,7 +165,7 @@ class StationRuns:
                 self.day.keeper.anew_reason = f"the system clock was set by {step_s:+.1f} s"
                 return self.day.keeper.anew_reason
             why = self.day.look()
-            if self.outlets.wish is not None:
+            if self.outlets.wish is not None and not self.day.is_going_to_stow:
                 return LED
             if why:
                 return why if self._may_begin() else ""
@@ -183,6 +183,7 @@ class StationRuns:
                 self._horn.forget()
                 self._is_placed = True
                 self._service.ask(after)
+                self.day.stow_is_asked()
             return ""
         if isinstance(after, tuple) and self._is_warned({"az_deg": after[0], "el_deg": after[1]}):
             return MOVES
