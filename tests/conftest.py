@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 import pytest_asyncio
 from hypothesis import settings
-from machine_load import STARVED_COUNT, MachineLoad
+from machine_load import MachineLoad
 from xdist.scheduler import LoadScopeScheduling
 
 PROJECT = Path(__file__).resolve().parents[1]
@@ -55,6 +55,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeSch
 
 
 LOAD = MachineLoad()
+NO_VERDICT = PROJECT / "build" / "no-verdict.txt"  # scripts/test runs them once more, alone
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -66,13 +67,14 @@ def pytest_runtest_protocol(item: pytest.Item) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """On a machine that starves them the failure of real processes is no verdict: skipped, and told."""
+    """Where a machine starves them, or stood still, the failure of real processes is no verdict: skipped and named."""
     report = yield
-    if report.failed and item.get_closest_marker("realtime"):
-        per_core = LOAD.per_core(str(item.path))
-        if per_core > STARVED_COUNT:
-            why = f"no verdict: {per_core:.0f} processes waited for each core of this machine meanwhile"
-            report.outcome, report.longrepr = "skipped", (str(item.path), item.location[1], why)
+    is_asked = report.failed and item.get_closest_marker("realtime")
+    if is_asked and (why := LOAD.why_no_verdict(str(item.path))):
+        report.outcome, report.longrepr = "skipped", (str(item.path), item.location[1], f"no verdict: {why}")
+        NO_VERDICT.parent.mkdir(exist_ok=True)
+        with NO_VERDICT.open("a", encoding="utf-8") as names:
+            names.write(f"{item.nodeid}\n")
     return report
 
 

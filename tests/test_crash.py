@@ -94,6 +94,11 @@ class Crashes:
         seen: dict[str, Any] = json.loads(path.read_text())
         return seen
 
+    @property
+    def kept_state(self) -> str:
+        """What the next daemon would read."""
+        return str(json.loads((self.rig.kept / "run.json").read_text())["state"])
+
     def hit_fit_process(self, number: signal.Signals) -> None:
         """Kill or stop the fit process; wait until another one fits."""
         wait_until(lambda: len(children(self.rig.daemon.pid)) == 1)
@@ -121,7 +126,7 @@ class Crashes:
         wait_until(lambda: rig.state == "HOLD/FITTED")
         for number in range(len(LOADS)):
             self.sleep_until(FIRST_KILL_S[rig.link] + number * APART_S)
-            wait_until(lambda: rig.state == "HOLD/FITTED")  # a starved machine may still be on its way back
+            wait_until(lambda: rig.state == self.kept_state == "HOLD/FITTED")  # a starved one is long on its way
             self.crash()
         self.sleep_until(LOSS_S[1])
         wait_until(lambda: rig.state == "AUTOTRACK/FITTED")

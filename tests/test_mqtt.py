@@ -15,7 +15,8 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass, field, replace
 from operator import eq, gt, lt, ne
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, ClassVar
 
 import aiomqtt
 import pytest
@@ -359,6 +360,50 @@ async def test_user_and_password_are_given_and_wrong_ones_are_tried_again_in_pea
             async with listening(port, "site/#", username="dish", password="secret") as following:
                 assert await following("site/dish/availability") == b"online"
             assert publisher.connect_count == 1
+
+
+class Losing:
+    """A client that loses the first cancellation, as asyncio.wait_for of Python 3.11 does when an answer comes."""
+
+    to_lose: ClassVar[int] = 1
+
+    def __init__(self, *_: Any, **__: Any) -> None:
+        self._client = SimpleNamespace(on_disconnect=None, disconnect=lambda: None)
+
+    async def __aenter__(self) -> "Losing":
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        return
+
+    async def publish(self, *_: Any, **__: Any) -> None:
+        try:
+            await asyncio.sleep(3600.0)
+        except asyncio.CancelledError:
+            Losing.to_lose -= 1
+            if Losing.to_lose < 0:
+                raise
+
+
+class Refused(Losing):
+    async def __aenter__(self) -> "Losing":
+        await self.publish()
+        raise aiomqtt.MqttError("refused")
+
+
+@pytest.mark.parametrize("client", [Losing, Refused])
+async def test_an_end_that_comes_with_the_brokers_answer_is_not_lost(
+    client: type, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mqtt_publisher.aiomqtt, "Client", client)
+    monkeypatch.setattr(Losing, "to_lose", 1)
+    publisher = MqttPublisher(BrokerAddress("127.0.0.1", 1), TOPICS, Station().sources(), (0.05, 0.2))
+    task = asyncio.create_task(publisher.run())
+    await asyncio.sleep(0.01)
+    task.cancel()
+    done, _ = await asyncio.wait([task], timeout=2.0)
+    assert done
+    assert task.cancelled()
 
 
 async def test_a_broker_that_takes_connections_and_says_nothing_keeps_nobody_waiting(

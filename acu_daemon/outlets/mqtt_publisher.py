@@ -75,6 +75,7 @@ class MqttPublisher:
                 self._tell(str(error) or type(error).__name__)
             except Exception as error:  # noqa: BLE001  the top of its own task
                 self._tell_failed(repr(error))
+            _heed_cancelling()
             if loop.time() - begun_s > self._longest_pause_s:
                 pause_s = self._first_pause_s
             await asyncio.sleep(pause_s)
@@ -155,3 +156,11 @@ def _hang_up(client: aiomqtt.Client) -> None:
 
 async def _publish(client: aiomqtt.Client, message: MqttMessage) -> None:
     await client.publish(message.topic, message.payload, qos=0, retain=message.is_retained, timeout=PATIENCE_S)
+    _heed_cancelling()
+
+
+def _heed_cancelling() -> None:
+    """End a task that was told to: asyncio.wait_for of Python 3.11, in aiomqtt, loses it where the answer comes too."""
+    task = asyncio.current_task()
+    if task is not None and task.cancelling():
+        raise asyncio.CancelledError
