@@ -6,7 +6,6 @@ Shared by scripts/bench_pass.py and the tests of the real processes.
 import contextlib
 import json
 import math
-import os
 import shutil
 import signal
 import subprocess
@@ -36,7 +35,7 @@ STARTS = 4.0  # and on a busy machine this many times what one start takes
 BEFORE_RISE_S = 30.0  # a whole pass begins this long before the rise
 SAY_EVERY_S = 5.0
 DAEMON_NICENESS = -10  # as its unit says
-HARDWARE_NICENESS = -10  # of what stands for hardware, where permitted: a real ACU does not share the host's processor
+HARDWARE_NICENESS = -15  # of what stands for hardware, where permitted: a real ACU does not share the host's processor
 
 SCENARIO = """\
 [sky]
@@ -182,12 +181,16 @@ class Rig:
             files += ["--truth", str(self.scene.truth)]
         with (self.directory / "acu.err").open("w") as errors:
             self.acu = subprocess.Popen(
-                [*self.arguments("fake-acu"), *where, *files, *more], stdout=subprocess.PIPE, stderr=errors, text=True
+                [*self.arguments("fake-acu"), *where, *files, *more],
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                text=True,
+                start_new_session=True,
             )
-        keep_time_of(self.acu.pid)
         said = self.acu.stdout.readline() if self.acu.stdout else ""
         if not said.startswith("listening "):
             raise BenchError(f"the simulated ACU did not start: {(self.directory / 'acu.err').read_text()}")
+        keep_time_of(self.acu.pid)
         self.url = said.split()[1]
         station = self.config / "station.toml"
         station.write_text(station.read_text().replace("tcp://127.0.0.1:3842", self.url))
@@ -246,9 +249,11 @@ class Rig:
 
 
 def keep_time_of(pid: int) -> None:
-    """Let a process that stands for hardware run before the others of this machine, where that is permitted."""
-    with contextlib.suppress(PermissionError):
-        os.setpriority(os.PRIO_PROCESS, pid, HARDWARE_NICENESS)
+    """Let what stands for hardware, and has begun, run before all daemons of this machine, where that is permitted.
+
+    In a session of its own: among the processes of this one it would wait while a daemon starts.
+    """
+    try_nice(pid, HARDWARE_NICENESS)
 
 
 @contextlib.contextmanager

@@ -138,13 +138,16 @@ def half_open_and_freeze(rig: Any) -> Story:
     control = begin(rig)
     arguments = ["fault-proxy", "--listen", "127.0.0.1:0", "--to", rig.url.removeprefix("tcp://")]
     proxy = subprocess.Popen(
-        [*pass_rig.ACU_DAEMON, *arguments, "--control", "127.0.0.1:0"], stdout=subprocess.PIPE, text=True
+        [*pass_rig.ACU_DAEMON, *arguments, "--control", "127.0.0.1:0"],
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
     )
-    pass_rig.keep_time_of(proxy.pid)
     busy: list[subprocess.Popen[bytes]] = []
     try:
         assert proxy.stdout is not None
         url, line = (proxy.stdout.readline().split()[1] for _ in range(2))
+        pass_rig.keep_time_of(proxy.pid)
         station = rig.config / "station.toml"
         station.write_text(station.read_text().replace(rig.url, url))
         rig.start_daemon()
