@@ -86,6 +86,30 @@ async def test_what_runs_during_a_pass_ends_with_it(tmp_path):
     assert marks.read_text().split() == ["begun", "ended"]
 
 
+async def test_what_ends_while_it_is_being_started_is_asked_to_end_as_any_other(tmp_path, monkeypatch):
+    marks = tmp_path / "marks"
+
+    async def start_slowly(*command, **pipes):
+        process = await start(*command, **pipes)
+        while not marks.exists() or marks.read_text() != "begun\n":
+            await asyncio.sleep(0.01)
+        has_begun.set()
+        await asyncio.sleep(0.2)
+        return process
+
+    start, has_begun = module.start, asyncio.Event()
+    monkeypatch.setattr(module, "start", start_slowly)
+    text = f"trap 'echo ended >> {marks}; exit 0' TERM; echo begun >> {marks}; while :; do sleep 0.05; done"
+    hooks = Hooks({Hook.DURING_PASS: shell(text)}, 20.0)
+    hooks.call(Hook.DURING_PASS, ABOUT)
+    await has_begun.wait()
+    hooks.end_during()
+    await hooks.close()
+    assert marks.read_text().split() == ["begun", "ended"]
+    [result] = hooks.take_results()
+    assert (result.status, result.problem) == (0, "")
+
+
 async def test_too_many_at_once_are_refused_and_told(monkeypatch):
     monkeypatch.setattr(module, "MOST_RUNNING", 2)
     hooks = Hooks({Hook.ON_ALARM: shell("sleep 60")}, 20.0)

@@ -146,10 +146,10 @@ class Hooks:
     async def _run(
         self, hook: Hook, command: Sequence[str], about: Mapping[str, Any], limit_s: float | None
     ) -> HookResult:
-        loop = asyncio.get_running_loop()
+        loop, is_over = asyncio.get_running_loop(), False
         begun_s = loop.time()
-        try:
-            process = await start(
+        starting = asyncio.ensure_future(
+            start(
                 *launch(command, self._user),
                 stdin=asyncio.subprocess.PIPE,
                 stdout=asyncio.subprocess.PIPE,
@@ -159,6 +159,12 @@ class Hooks:
                 cwd=directory(self._user),
                 umask=UMASK,
             )
+        )
+        try:
+            try:
+                process = await asyncio.shield(starting)
+            except asyncio.CancelledError:  # it may run already: it is ended like any other
+                process, is_over = await starting, True
         except OSError as error:
             return HookResult(hook, None, 0.0, "", f"{command[0]}: {error.strerror or error}")
         if process.stdin is not None:
@@ -167,7 +173,7 @@ class Hooks:
                 process.stdin.close()
         output = asyncio.create_task(_read(process.stdout))
         try:
-            status, problem = await _ended(process, limit_s)
+            status, problem = (await _killed(process), "") if is_over else await _ended(process, limit_s)
             said = await _last_words(output)
         finally:
             output.cancel()
