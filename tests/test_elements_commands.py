@@ -192,7 +192,7 @@ class Child:
         self.words = words
         return self
 
-    async def communicate(self) -> tuple[bytes, bytes]:
+    async def communicate(self, _: bytes | None = None) -> tuple[bytes, bytes]:
         return self.said, self.complaint
 
 

@@ -86,6 +86,23 @@ async def test_what_runs_during_a_pass_ends_with_it(tmp_path):
     assert marks.read_text().split() == ["begun", "ended"]
 
 
+async def test_what_is_ending_as_the_daemon_ends_keeps_its_grace(tmp_path):
+    marks = tmp_path / "marks"
+    text = (
+        f"trap 'echo told >> {marks}; sleep 0.3; echo ended >> {marks}; exit 0' TERM; echo begun >> {marks}; "
+        "while :; do sleep 0.05; done"
+    )
+    hooks = Hooks({Hook.DURING_PASS: shell(text)}, 20.0)
+    hooks.call(Hook.DURING_PASS, ABOUT)
+    while not marks.exists():
+        await asyncio.sleep(0.01)
+    hooks.end_during()
+    while "told" not in marks.read_text():
+        await asyncio.sleep(0.01)
+    await hooks.close()
+    assert marks.read_text().split() == ["begun", "told", "ended"]
+
+
 async def test_what_ends_while_it_is_being_started_is_asked_to_end_as_any_other(tmp_path, monkeypatch):
     marks = tmp_path / "marks"
 

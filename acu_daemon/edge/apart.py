@@ -4,12 +4,11 @@ The child (edge.apart_child) is niced, loads what the function needs, answers on
 """
 
 import asyncio
-import contextlib
 import pickle
 from collections.abc import Callable
 from typing import Any
 
-from acu_daemon.edge.child_process import start_python
+from acu_daemon.edge.child_process import answer_of, start_python
 from acu_daemon.errors import AcuDaemonError
 from acu_daemon.orbit.timescales import leap_dates
 
@@ -38,15 +37,9 @@ async def apart(function: Callable[..., Any], *given: object) -> Any:
     except OSError as error:
         raise ApartError(f"no process for it: {error.strerror or error}") from None
     try:
-        async with asyncio.timeout(LONGEST_S):
-            answer, said = await child.communicate(question)
+        answer, said = await answer_of(child, LONGEST_S, question)
     except TimeoutError:
         raise ApartError(f"not done within {LONGEST_S:g} s") from None
-    finally:
-        if child.returncode is None:
-            with contextlib.suppress(ProcessLookupError):
-                child.kill()
-            await child.wait()
     if child.returncode:
         words = said.decode("utf-8", "replace").strip()[-SAID_CHARACTERS:]
         raise ApartError(f"its process died (exit status {child.returncode}): {words}")

@@ -28,6 +28,23 @@ async def start(*command: str, **pipes: Any) -> asyncio.subprocess.Process:
         raise OSError(f"{error}") from None
 
 
+async def answer_of(
+    process: asyncio.subprocess.Process, longest_s: float, question: bytes = b""
+) -> tuple[bytes, bytes]:
+    """What a process prints until it ends, on both its outputs; one that nobody waits for any more is killed.
+
+    question: for its standard input.  Raises: TimeoutError: it took longer.
+    """
+    try:
+        async with asyncio.timeout(longest_s):
+            return await process.communicate(question or None)
+    finally:
+        if process.returncode is None:
+            with contextlib.suppress(ProcessLookupError):
+                process.kill()
+            await process.wait()
+
+
 async def exited(process: asyncio.subprocess.Process) -> int:
     """Wait for the end of a process alone; its own `wait` waits for every grandchild that keeps a pipe open as well."""
     loop = asyncio.get_running_loop()

@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 import structlog
 
 from acu_daemon.config.elements_tables import ElementsSourcesSection
-from acu_daemon.edge.child_process import start_python
+from acu_daemon.edge.child_process import answer_of, start_python
 from acu_daemon.edge.clock import Clock
 from acu_daemon.edge.clock_sense import before_release
 from acu_daemon.edge.elements_status import fetch_problems
@@ -109,15 +109,9 @@ class ElementsFetching:
         except OSError as error:
             return f"no process for it: {error.strerror or error}"
         try:
-            async with asyncio.timeout(LONGEST_S):
-                said, complaint = await child.communicate()
+            said, complaint = await answer_of(child, LONGEST_S)
         except TimeoutError:
             return f"the process took more than {LONGEST_S:g} s and was ended"
-        finally:
-            if child.returncode is None:
-                with contextlib.suppress(ProcessLookupError):
-                    child.kill()
-                await child.wait()
         self._tell(said)
         if not child.returncode:
             return ""

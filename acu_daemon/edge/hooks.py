@@ -125,9 +125,10 @@ class Hooks:
         return taken
 
     async def close(self) -> None:
-        """End all hooks."""
-        for task in list(self._running):
-            task.cancel()
+        """End all hooks; one that is ending already keeps its grace."""
+        for task in self._running:
+            if not task.cancelling():
+                task.cancel()
         await asyncio.gather(*self._running, return_exceptions=True)
 
     async def _follow(
