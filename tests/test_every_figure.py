@@ -215,7 +215,7 @@ def test_every_figure_of_a_snapshot_is_its_own() -> None:
     port = SimpleNamespace(attempt_count=111, is_up=True, problem="was down")
     subject = Subject("SAT", "here", "tcp", coming, "TLE of", "stale", ("next",), StationFacts("calm", "flown", "noon"))
     made: Any = take_snapshot(
-        *(area, foreground, port, CONFIG, NOW, subject),  # type: ignore[arg-type]
+        *(area, foreground, port, CONFIG, NOW, subject),
         is_rehearsal=True,
         files_alarm="disk",
     )

@@ -332,7 +332,7 @@ def test_site_air_schedule_wind_and_hooks_have_every_value_in_their_place(
     assert site.orientation == EarthOrientation(0.21, 0.31, 0.41)
     assert site.skyline == SKYLINE
     assert site.antenna is not None
-    assert site.antenna.mount == MOUNT  # type: ignore[attr-defined]
+    assert site.antenna.mount == MOUNT
     assert station.atmosphere.air(site.station) == Air(981.0, 17.0, 63.0)
     window = Window(tai_from_utc("2026-01-02T03:04:05Z"), tai_from_utc("2026-01-02T04:05:06Z"), "paint")
     assert station.schedule.rules(AZIMUTH, ELEVATION) == StationRules(AZIMUTH, ELEVATION, 62.0, 12.0, (window,))

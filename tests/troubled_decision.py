@@ -14,6 +14,7 @@ from acu_daemon.acu.commands import AcuMode, Command, SelectMode, Stop
 from acu_daemon.acu.replies import AcuStatus, Refused, Reply
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.orders import Orders
+from acu_daemon.control.receiver_signal import SignalSample
 from acu_daemon.control.state import ControlState
 from acu_daemon.control.tick import tick
 from acu_daemon.control.tick_input import Exchange, Observation, PassPlan, Request, Sky, TickInput
@@ -150,12 +151,16 @@ class TroubledDecision:
         plan = PassPlan(*(START_TAI_S + one for one in (RISE_S, PASS_S, RISE_S)), float(az_deg[38]), float(el_deg[38]))
         return Sky(prediction, FitResult("full", Correction(), 0.0, 1, 0, 0.0, 0.1, 0.1) if has_fit else None, plan)
 
+    def heard_beside(self, now_s: float) -> SignalSample | None:
+        """What a receiver beside the ACU says."""
+        return None
+
     def run(self, count: int) -> Iterator[tuple[ControlState, Orders]]:
         """Tick; what each was given is in `given`."""
         for k in range(count):
             now_s = PERIOD_S * (k + 1) + (0.02 * self.random.random() if self.random.random() < 0.05 else 0.0)
             self._next_trouble(now_s)
-            one = TickInput(self._observe(now_s), self.sky(now_s), START_TAI_S + now_s)
+            one = TickInput(self._observe(now_s), self.sky(now_s), START_TAI_S + now_s, self.heard_beside(now_s))
             self.given.append(one)
             self.state, self.orders = tick(self.state, one, self.config)
             yield self.state, self.orders
