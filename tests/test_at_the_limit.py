@@ -406,3 +406,18 @@ def test_a_way_takes_as_long_as_its_slower_axis_and_the_longest_gap_as_the_longe
     assert rules.slew_s(az_deg, el_deg) == max(alone)
     assert rules.slew_s(-az_deg, -el_deg) == max(alone)
     assert rules.longest_gap_s == 62.0 + 12.0 + rules.slew_s(540.0, 90.0)
+
+
+@pytest.mark.parametrize("was_locked", [False, True])
+@pytest.mark.parametrize("lost_s", [None, 3.0])
+@pytest.mark.parametrize(("level_db", "said"), [(9.0, None), (5.0, None), (1.0, None), (1.0, True), (9.0, False)])
+def test_a_loss_is_timed_by_the_word_that_tells_it_and_forgotten_with_the_next_lock(
+    was_locked: bool, lost_s: float | None, level_db: float, said: bool | None
+) -> None:
+    before = ReceiverSignal(4.0, 2.0, was_locked, lost_s)
+    is_locked = said if said is not None else level_db == 9.0 or (level_db == 5.0 and was_locked)
+    seen = judge_signal(before, SignalSample(5.0, level_db, said), SIGNAL)
+    expected_lost_s = None if is_locked else 5.0 if was_locked else lost_s
+    assert seen == ReceiverSignal(5.0, level_db, is_locked, expected_lost_s)
+    assert judge_signal(before, None, SIGNAL) is before
+    assert judge_signal(before, SignalSample(5.0, None), SIGNAL) is before

@@ -1,5 +1,9 @@
 """schedule.wind: stow above the limits, hysteresis, stale wind."""
 
+from dataclasses import replace
+from itertools import product
+from math import inf
+
 import pytest
 
 from acu_daemon.orbit.timescales import utc_text
@@ -76,3 +80,48 @@ def test_what_is_no_wind_is_not_heard(speeds):
 def test_an_older_sample_does_not_replace_a_newer_one():
     state = watch(WindWatch(), WindSample(12.0, 12.0, 100.0), RULES, 100.0)
     assert watch(state, WindSample(1.0, 1.0, 40.0), RULES, 101.0).newest == state.newest
+
+
+NOW = 10_000.0
+HEARD = {  # mean and gust of a sample of now; None: the newest is that of an hour ago
+    "strong": (RULES.mean_limit_m_s + 1.0, 1.0),
+    "between": (RULES.mean_limit_m_s - 0.1, 1.0),
+    "calm": (1.0, 1.0),
+    "nothing": None,
+}
+
+
+@pytest.mark.parametrize("when_stale", ["go_on", "stow"])
+@pytest.mark.parametrize("heard", HEARD)
+def test_from_every_state_the_watch_goes_where_its_drawing_says_and_keeps_nothing_of_before(
+    heard: str, when_stale: str
+) -> None:
+    sample = None if HEARD[heard] is None else WindSample(*HEARD[heard], NOW)
+    old, rules = WindSample(1.0, 1.0, NOW - 3600.0), replace(RULES, when_stale=when_stale)
+    for wind, wants_stow, calm_s, is_let_go in product(Wind, (False, True), (inf, 599.0, 600.0), (False, True)):
+        since_s = NOW - calm_s if calm_s < inf else inf
+        after = watch(WindWatch(wind, wants_stow, since_s, old, is_let_go), sample, rules, NOW)
+        is_over = calm_s == 600.0 or not wants_stow
+        expected = {
+            "strong": (Wind.STRONG, True, inf),
+            "between": (Wind.STRONG if wants_stow else Wind.CALM, wants_stow, inf),
+            "calm": (Wind.CALM, False, inf) if is_over else (Wind.STRONG, True, min(since_s, NOW)),
+            "nothing": (Wind.STALE, not is_let_go and (wants_stow or when_stale == "stow"), inf),
+        }[heard]
+        assert (after.wind, after.wants_stow, after.calm_since_tai_s) == expected
+        assert after.is_let_go is (is_let_go and heard == "nothing")
+        assert after.newest == (sample or old)
+        assert ("calm since" in after.words, ", stow" in after.words) == (expected[2] < inf, expected[1])
+
+
+@pytest.mark.parametrize(("later_s", "mean_m_s"), [(-1e-3, 1.0), (0.0, 2.0), (1e-3, 2.0)])
+def test_of_two_winds_the_one_that_is_not_older_counts(later_s: float, mean_m_s: float) -> None:
+    after = watch(WindWatch(newest=WindSample(1.0, 1.0, NOW)), WindSample(2.0, 2.0, NOW + later_s), RULES, NOW)
+    assert after.newest is not None
+    assert after.newest.mean_m_s == mean_m_s
+
+
+def test_a_wind_that_is_not_watched_says_nothing() -> None:
+    assert WindWatch(newest=WindSample(1.0, 2.0, NOW)).words == ""
+    assert WindWatch(Wind.STALE).words == "wind stale"
+    assert WindWatch(Wind.CALM, newest=WindSample(8.26, 12.94, NOW)).words == "wind calm, mean 8.3 m/s, gusts 12.9 m/s"
