@@ -78,6 +78,12 @@ def is_meant(off_s: float) -> bool:
     return decide([short], replace(RULES, requests=(request,)))[0].slot is None
 
 
+def is_meant_of_long(at_s: float) -> bool:
+    """Whether a word about a time is one about a pass from 1000 to 5000 s."""
+    request = PassRequest("A", DAY + at_s, Wish.EXCLUDE)
+    return decide([track("A", 1000.0, 4000.0)], replace(RULES, requests=(request,)))[0].slot is None
+
+
 def book_state(now_s: float, until_s: float) -> PassState:
     """Of a pass from 1000 to 1600 s that a new plan does not have."""
     book = merged((), decide([track("A", 1000.0)], RULES), DAY, DAY + 9e4).book
@@ -206,6 +212,8 @@ LIMITS: dict[str, tuple[Callable[[float], Any], float, tuple[Any, Any, Any]]] = 
     "a window after": (lambda x: granted_beside((x, 9e3)), 1600.0 + RULES.post_s, (False, True, True)),
     "a word about a pass that is later": (is_meant, -600.0, (False, False, True)),
     "a word about a pass that was earlier": (is_meant, 600.0, (True, False, False)),
+    "a word about a long pass at its rise": (is_meant_of_long, 1000.0, (False, True, True)),
+    "a word about a long pass at its set": (is_meant_of_long, 5000.0, (True, True, False)),
     "a pass that went by": (
         lambda x: book_state(x, 9e4),
         1600.0,
@@ -421,3 +429,15 @@ def test_a_loss_is_timed_by_the_word_that_tells_it_and_forgotten_with_the_next_l
     assert seen == ReceiverSignal(5.0, level_db, is_locked, expected_lost_s)
     assert judge_signal(before, None, SIGNAL) is before
     assert judge_signal(before, SignalSample(5.0, None), SIGNAL) is before
+
+
+@pytest.mark.parametrize(
+    ("wish", "is_granted"), [(Wish.FORCE, True), (Wish.GO_ON, True), (Wish.NONE, False), (None, False)]
+)
+def test_a_pass_that_stays_too_low_is_tracked_by_a_persons_word_alone(wish: Wish | None, is_granted: bool) -> None:
+    requests = () if wish is None else (PassRequest("A", DAY + 1300.0, wish),)
+    (found,) = decide([track("A", 1000.0, min_culmination_deg=41.0)], replace(RULES, requests=requests))
+    assert (found.slot is not None) is is_granted
+    assert is_granted or found.reason == "culminates at 40.0 deg, min_culmination_deg is 41"
+    others = (PassRequest("B", DAY + 1300.0, Wish.EXCLUDE),)
+    assert decide([track("A", 1000.0)], replace(RULES, requests=others))[0].slot is not None
