@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from acu_daemon.model import AxisLimits, Pass
+from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.schedule.decisions import decide
 from acu_daemon.schedule.exact_plan import AntennaPlace, Slot, best_slots, slots_of
 from acu_daemon.schedule.pass_track import PassTrack
@@ -216,3 +217,26 @@ def test_of_two_words_about_a_pass_the_newer_one_counts(first: Wish, last: Wish)
         assert [(one.track.satellite, one.slot, one.reason) for one in both] == [
             (one.track.satellite, one.slot, one.reason) for one in alone
         ]
+
+
+def test_a_pass_is_lost_to_the_one_that_has_most_of_its_time_and_the_words_say_how_much():
+    others = [track("B", 500.0, 700.0, priority=9), track("C", 1400.0, 500.0, priority=9)]
+    found = decide([*others, track("A", 1000.0, 600.0, priority=1)], RULES)
+    (lost,) = [one for one in found if one.track.satellite == "A"]
+    assert lost.slot is None
+    assert lost.reason.startswith("lost to ")
+    assert "(priority 9): both are up for 200 s" in lost.reason
+    uneven = [track("B", 500.0, 600.0, priority=9), track("C", 1300.0, 500.0, priority=9)]
+    (lost,) = [one for one in decide([*uneven, track("A", 1000.0, 600.0)], RULES) if one.track.satellite == "A"]
+    assert lost.reason.startswith("lost to C of ")
+    assert lost.reason.endswith("both are up for 300 s")
+
+
+def test_a_pass_that_is_cut_says_from_when_to_when():
+    tracks = [track("A", 1000.0, 800.0, priority=1, may_be_cut=True), track("B", 1600.0, 600.0, priority=9)]
+    (found,) = [one for one in decide(tracks, RULES) if one.track.satellite == "A"]
+    assert found.slot is not None
+    times = [utc_text(one, 0)[11:19] for one in (found.slot.start_tai_s, found.slot.end_tai_s)]
+    assert found.reason == f"cut to {times[0]} to {times[1]}"
+    assert found.slot.start_tai_s == DAY + 1000.0
+    assert found.slot.end_tai_s < DAY + 1600.0 - RULES.pre_s - RULES.post_s
