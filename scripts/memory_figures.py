@@ -141,7 +141,7 @@ def station(case: str, counts: tuple[int, ...], seed: int) -> list[Trial]:
                 {name: one[0] for name, one in ours.items()},
                 sure,
                 {name: one[1] for name, one in ours.items()},
-                (memory.mount.at(start_tai_s).mean / DEG - truth).tolist(),
+                (memory.chosen.at(start_tai_s).mean / DEG - truth).tolist(),
                 memory.has_mount,
                 after.why_not or after.note,
                 after.shift_deg is not None or any(one[2] for one in ours.values()),

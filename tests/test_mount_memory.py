@@ -25,7 +25,7 @@ from acu_daemon.assist.mount_memory.pedestal_memory import (
     first_memory,
     prior_of,
 )
-from acu_daemon.assist.mount_memory.update import Updated, fused, updated
+from acu_daemon.assist.mount_memory.update import MOST_STILL, Updated, fused, under_another_prior, updated
 from acu_daemon.assist.mount_model import encoder_look
 from acu_daemon.assist.session.refit import RefitReply, RefitRequest, RefitSetup, Refitter
 from acu_daemon.model import AxisLimits, Model, Readings
@@ -128,11 +128,13 @@ def test_what_a_survey_gave_is_held_to_its_sigma_in_both_memories() -> None:
 
 def test_zero_points_walk_5_thousandths_in_a_day_and_never_beyond_what_was_known_before() -> None:
     known = Remembered(np.zeros(STATE_COUNT), np.zeros((STATE_COUNT, STATE_COUNT)))
-    memory = PedestalMemory(0.0, 5, known, known)
+    memory = PedestalMemory(0.0, 5, known, known, known)
     day = np.sqrt(np.diag(aged(memory, SETTINGS, DAY_S).mount.covariance)) / DEG
     assert day == pytest.approx([0.005, 0.0005, 0.005, 0.0, 0.0005, 0.002, 0.002, 0.0005, *[0.002] * 4])
     four = np.sqrt(np.diag(aged(memory, SETTINGS, 4.0 * DAY_S).mount.covariance)) / DEG
     assert four == pytest.approx(2.0 * day)
+    still = np.sqrt(np.diag(aged(memory, SETTINGS, DAY_S).still.covariance)) / DEG
+    assert still == pytest.approx([0.002, 0.0005, 0.002, 0.0, 0.0005, 0.002, 0.002, 0.0005, *[0.0] * 4])
     ages = np.sqrt(np.diag(aged(memory, SETTINGS, 1e6 * DAY_S).mount.at(0.0).covariance))
     assert (ages <= a_priori_sigmas(SETTINGS)[1] * (1.0 + 1e-9)).all()
 
@@ -216,6 +218,54 @@ def test_a_zero_point_swings_no_farther_than_what_was_known_of_it_before_any_pas
         h = at_time_of_day(float(tai_s))
         assert np.sqrt(np.diag(h @ np.diag(variance) @ h.T)) == pytest.approx(sigma)
         assert np.sqrt(np.diag(seen.at(float(tai_s)).covariance)) == pytest.approx(a_priori_sigmas(SETTINGS)[1])
+
+
+def test_zero_points_that_hold_still_are_told_from_those_that_move_and_better_known() -> None:
+    """Evidence of a pass is at most some units, and bounded, so that a pedestal that begins to move is found out."""
+    still, _ = after_swings(0.0, 0.0)
+    moving, _ = after_swings(0.03, 0.6)
+    assert 1.0 < still.still_evidence < MOST_STILL
+    assert moving.still_evidence < -3.0
+    assert not moving.is_still
+    found, moves = (np.sqrt(np.diag(one.covariance))[[0, 2]] for one in (still.still, still.mount))
+    assert (found < moves).all()
+    sure = replace(still, still_evidence=MOST_STILL)
+    assert sure.is_still
+    assert sure.chosen is sure.still
+    prior = prior_of(sure, SETTINGS, sure.at_tai_s)
+    assert prior is not None
+    assert np.array_equal(prior.mean, sure.still.terms.mean)
+    one = passes(CROOKED, SWUNG + 1)[-1]
+    again = updated(sure, estimate_of(one, read(one, 80), sure), SETTINGS)
+    assert again.why_not == ""
+    assert again.memory.still_evidence == MOST_STILL
+    other = updated(replace(still, still_evidence=2.99), estimate_of(one, read(one, 80), still), SETTINGS)
+    assert other.note == "the zero points of the last passes hold still"
+
+
+@given(st.integers(0, 10_000))
+def test_under_another_prior_a_pass_says_what_a_fit_with_that_prior_says(seed: int) -> None:
+    """Against estimate and marginal likelihood of a linear measurement, computed in full; one state is not open."""
+    rng = np.random.default_rng(seed)
+    looks, open_terms = rng.standard_normal((20, 4)), np.array([1.0, 1.0, 1.0, 0.0])
+    readings = looks @ (open_terms * rng.standard_normal(4)) + rng.standard_normal(20)
+    given, other = (
+        Remembered(open_terms * rng.standard_normal(4), np.diag(open_terms * rng.uniform(0.01, 2.0, 4)))
+        for _ in range(2)
+    )
+
+    def solved(prior: Remembered) -> tuple[Remembered, float]:
+        total = looks @ prior.covariance @ looks.T + np.eye(20)
+        gain = np.linalg.solve(total, looks @ prior.covariance).T
+        off = readings - looks @ prior.mean
+        evidence = -0.5 * float(off @ np.linalg.solve(total, off) + np.linalg.slogdet(total)[1])
+        return Remembered(prior.mean + gain @ off, prior.covariance - gain @ looks @ prior.covariance), evidence
+
+    (estimate, before), (wanted, after) = solved(given), solved(other)
+    found, likelier = under_another_prior(estimate, given, other)
+    assert found.mean == pytest.approx(wanted.mean, rel=1e-6, abs=1e-8)
+    assert found.covariance == pytest.approx(wanted.covariance, rel=1e-6, abs=1e-8)
+    assert likelier == pytest.approx(after - before, rel=1e-6, abs=1e-6)
 
 
 # Noise that goes on
@@ -322,6 +372,7 @@ def test_what_the_next_passes_say_of_it_re_zeroes_the_memory_and_it_goes_on_from
     assert shift_deg is not None
     assert shift_deg[0] == pytest.approx(-0.2, abs=0.1)
     assert "in azimuth" in told[first].note
+    assert told[first].memory.still_evidence == 0.0
     assert [one.why_not for one in told[first + 1 :]] == [""] * (4 - first)
     assert memory.mount.mean[0] / DEG == pytest.approx(CROOKED.ia_deg - 0.2, abs=0.03)
 

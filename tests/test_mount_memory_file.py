@@ -67,7 +67,9 @@ def test_what_is_written_is_read_again(tmp_path: Path, kept: MountFile) -> None:
     assert again is not None
     assert again.memory.mount.mean == pytest.approx(kept.memory.mount.mean, rel=1e-12)
     assert again.memory.const.covariance == pytest.approx(kept.memory.const.covariance, rel=1e-12)
-    assert (again.memory.pass_count, again.memory.evidence) == (3, kept.memory.evidence)
+    assert again.memory.still.covariance == pytest.approx(kept.memory.still.covariance, rel=1e-12)
+    evidence = kept.memory.evidence, kept.memory.still_evidence
+    assert (again.memory.pass_count, again.memory.evidence, again.memory.still_evidence) == (3, *evidence)
     assert len(again.memory.doubts) == len(kept.memory.doubts)
     assert again.newest is not None
     assert kept.newest is not None
@@ -76,12 +78,25 @@ def test_what_is_written_is_read_again(tmp_path: Path, kept: MountFile) -> None:
     assert again.rows == (ROW,)
 
 
+def test_a_file_from_before_still_zero_points_were_weighed_has_those_of_the_mean_of_a_day(
+    tmp_path: Path, kept: MountFile
+) -> None:
+    said = json.loads(json.dumps(to_json(kept)))
+    del said["memory"]["still"], said["memory"]["still_evidence"]
+    (tmp_path / MOUNT).write_text(json.dumps(said))
+    again = read_mount_file(tmp_path / MOUNT, THIS)
+    assert again is not None
+    assert again.memory.still.terms.mean == pytest.approx(kept.memory.mount.terms.mean, rel=1e-12)
+    assert not again.memory.still.covariance[8:].any()
+    assert not again.memory.is_still
+
+
 def test_a_file_from_before_day_and_night_were_kept_is_taken_over_with_none_known(
     tmp_path: Path, kept: MountFile
 ) -> None:
     said = json.loads(json.dumps(to_json(kept)))
     said["version"] = 1
-    del said["day_and_night"]
+    del said["day_and_night"], said["memory"]["still"], said["memory"]["still_evidence"]
     for name in ("const", "mount"):
         old = said["memory"][name]
         old["mean_deg"] = old["mean_deg"][:8]
@@ -150,6 +165,8 @@ def changes(*keys: str | int, value: Any) -> Callable[[Any], None]:
         changes("memory", "passes", value=-1),
         changes("memory", "passes", value=1.5),
         changes("memory", "evidence", value=float("nan")),
+        changes("memory", "still_evidence", value="much"),
+        changes("memory", "still", value={}),
         changes("memory", "mount", "mean_deg", value=[0.0]),
         changes("memory", "mount", "mean_deg", 0, value=11.0),
         changes("memory", "mount", "covariance_deg2", 0, 0, value=-1.0),

@@ -25,7 +25,7 @@ def memory_of(ia_deg: float, ie_deg: float) -> PedestalMemory:
         covariance[8:, 8:] *= 0.1  # day and night
         covariance[0, 0] = covariance[2, 2] = (0.005 * DEG) ** 2
         known.append(Remembered(mean, covariance))
-    return replace(first, pass_count=10, const=known[0], mount=known[1])
+    return replace(first, pass_count=10, const=known[0], mount=known[1], still=known[1].still)
 
 
 def test_after_ten_seconds_of_lock_the_satellite_is_followed_as_if_the_encoders_were_known() -> None:

@@ -206,7 +206,9 @@ def to_json(kept: MountFile) -> dict[str, Any]:
             "passes": memory.pass_count,
             "const": _terms_json(memory.const),
             "mount": _terms_json(memory.mount),
+            "still": _terms_json(memory.still),
             "evidence": memory.evidence,
+            "still_evidence": memory.still_evidence,
             "doubts": [_doubt_json(one) for one in memory.doubts],
             "noise": [memory.noise.successive, memory.noise.excess],
         },
@@ -237,14 +239,17 @@ def from_json(read: Any) -> MountFile:
     if read["terms"] != list(PEDESTAL_TERMS):
         raise ValueError(f"expected the terms {', '.join(PEDESTAL_TERMS)}")
     memory, newest, has_swings = read["memory"], read["newest"], read["version"] == VERSION
+    mount = _kept(memory["mount"], has_swings=has_swings)
     return MountFile(
         pedestal=str(read["pedestal"]),
         memory=PedestalMemory(
             number(memory["at_tai_s"]),
             _count(memory["passes"]),
             _kept(memory["const"], has_swings=has_swings),
-            _kept(memory["mount"], has_swings=has_swings),
+            mount,
+            _terms(memory["still"], STATE_COUNT) if "still" in memory else mount.still,
             number(memory["evidence"]),
+            number(memory.get("still_evidence", 0.0)),
             tuple(_doubt(one) for one in memory["doubts"]),
             _noise(memory["noise"]),
         ),

@@ -35,6 +35,8 @@ def terms_lines(memory: PedestalMemory, settings: EstimatorSettings) -> list[str
             word = "told by the data" if told[k] else "hardly told by the data"
             lines.append(f"{name:5}{known.mean[k] / DEG:+9.4f}{now[k] / DEG:9.4f}{sigma[k] / DEG:9.4f}   {word}")
     lines.append("beyond [mount]; RF: what the refraction is off the one told, at 45 deg of elevation")
+    if memory.is_still:
+        return [*lines, f"IA and IE hold still: likelier by {memory.still_evidence:.1f} than that they move by the day"]
     return lines + [_swing_line(memory.chosen.mean, term) for term in (IA, IE) if sigma[term] > 0.0]
 
 

@@ -1,7 +1,8 @@
 """What sun and night do to the zero points: a cosine and a sine of the time of day, beside the mean of a day.  Pure.
 
 A memory keeps twelve states: the eight terms, each the mean over a day, and IA and IE by cosine and sine.  A pass of a
-quarter of an hour sees eight: IA + c cos w + s sin w, w = 2 pi times the share of the day.
+quarter of an hour sees eight: IA + c cos w + s sin w, w = 2 pi times the share of the day.  Of zero points that hold
+still c and s are 0.
 """
 
 import numpy as np
@@ -27,9 +28,9 @@ def at_time_of_day(tai_s: float) -> Array:
     return h
 
 
-def before_any_pass(sigma: Array) -> Array:
+def before_any_pass(sigma: Array, *, is_still: bool = False) -> Array:
     """Variances (12,) of the states, of terms with these sigmas (8,): a pass at any time sees terms with them."""
-    swing = np.minimum((SWING_DEG * DEG) ** 2, _MOST_SHARE * sigma[[IA, IE]] ** 2)
+    swing = np.minimum(0.0 if is_still else (SWING_DEG * DEG) ** 2, _MOST_SHARE * sigma[[IA, IE]] ** 2)
     variance = sigma**2
     variance[[IA, IE]] -= swing
     return np.concatenate((variance, np.repeat(swing, 2)))
@@ -38,6 +39,12 @@ def before_any_pass(sigma: Array) -> Array:
 def swing_walk(sigma: Array) -> Array:
     """Variances (4,) that a day adds to the swings; none where the zero point is not estimated."""
     return np.where(np.repeat(sigma[[IA, IE]], 2) > 0.0, (_SWING_WALK_DEG * DEG) ** 2, 0.0)
+
+
+def without_swings(mean: Array, covariance: Array) -> tuple[Array, Array]:
+    """States (12,) and their covariance that have the terms alone, as zero points that hold still have them."""
+    is_term = np.arange(STATE_COUNT) < COUNT
+    return np.where(is_term, mean, 0.0), np.where(np.outer(is_term, is_term), covariance, 0.0)
 
 
 def swing_of(mean: Array, term: int) -> tuple[float, float]:

@@ -13,9 +13,8 @@ from acu_daemon.assist.mount_memory.pedestal_memory import (
     LATEST_COUNT,
     PedestalMemory,
     Remembered,
-    a_priori_sigmas,
     aged,
-    in_a_pass,
+    expected,
     rezeroed,
     smoothed_noise,
 )
@@ -26,6 +25,7 @@ from acu_daemon.units import DEG, Array
 MOST_STRAIN = 8.0  # sigmas squared, of six states of the orbit
 MOST_NOISE = 1.5  # times the configured one
 REZEROED_CHI2 = 16.0  # of two; one pass in a thousand by chance, by the last, the last two or three together
+MOST_STILL = 10.0  # of the evidence of `still`, for or against: a pedestal that begins to move is found out
 _SEEN_SHARE = 0.02  # of a direction's variance that a pass must take away, that it counts as seen
 
 
@@ -47,6 +47,7 @@ def updated(before: PedestalMemory, seen: PassEstimate, settings: EstimatorSetti
     if why_not := _why_spoiled(seen):
         return Updated(before, why_not)
     memory = aged(before, settings, seen.at_tai_s)
+    given = expected(memory, settings, seen.begin_tai_s)
     if memory.pass_count:
         doubts = (*memory.doubts, seen.doubt)[-LATEST_COUNT:]
         latest = max(_latest(doubts), key=lambda one: one.log_evidence)
@@ -55,19 +56,21 @@ def updated(before: PedestalMemory, seen: PassEstimate, settings: EstimatorSetti
         if seen.doubt.is_rezeroed:
             return Updated(replace(before, doubts=doubts), "it is likelier with encoders that were re-zeroed")
         memory = replace(memory, doubts=doubts)
-        if why_not := _why_surprising(memory, seen, settings):
+        if why_not := _why_surprising(given[1], seen.mount):
             return Updated(replace(before, doubts=doubts), why_not)
-    sigmas = a_priori_sigmas(settings)
-    const, mount = (
-        fused(one, at_time_of_day(seen.begin_tai_s), in_a_pass(one, sigma, seen.begin_tai_s).covariance, estimate)
-        for one, sigma, estimate in zip((memory.const, memory.mount), sigmas, (seen.const, seen.mount), strict=True)
+    if_still, likelier = under_another_prior(seen.mount, given[1], given[2])
+    const, mount, still = (
+        fused(one, at_time_of_day(seen.begin_tai_s), prior.covariance, estimate)
+        for one, prior, estimate in zip(memory.known, given, (seen.const, seen.mount, if_still), strict=True)
     )
     after = replace(
         memory,
         pass_count=memory.pass_count + 1,
         const=const,
         mount=mount,
+        still=still,
         evidence=memory.evidence + seen.evidence,
+        still_evidence=float(np.clip(memory.still_evidence + likelier, -MOST_STILL, MOST_STILL)),
         noise=smoothed_noise(memory, seen.noise),
     )
     return Updated(after, note=_preference_text(before, after))
@@ -88,6 +91,33 @@ def fused(persistent: Remembered, h: Array, prior: Array, estimate: Remembered) 
     mean = persistent.mean + gain @ (estimate.mean - h @ persistent.mean)[is_open]
     covariance = persistent.covariance - gain @ (prior - estimate.covariance)[which] @ gain.T
     return Remembered(mean, (covariance + covariance.T) / 2.0)
+
+
+def under_another_prior(estimate: Remembered, given: Remembered, other: Remembered) -> tuple[Remembered, float]:
+    """What a pass says of its terms under another prior, and how much likelier it is, in its logarithm.
+
+    estimate: (x, C), made with the prior `given`, (m, P), so that g = inv(P) (x - m) and L = inv(P) - inv(P) C inv(P)
+    are gradient and information of a shift of that mean.  Under (m', P'), with d = m' - m, D = P' - P and h = g - L d:
+    g' = inv(1 + L D) h, L' = inv(1 + L D) L, x' = m' + P' g', C' = P' - P' L' P', and it is likelier by
+    d^T g - d^T L d / 2 + h^T D g' / 2 - ln det(1 + L D) / 2.
+    """
+    is_open = np.diag(given.covariance) > 0.0
+    which = np.ix_(is_open, is_open)
+    unit = np.sqrt(np.diag(given.covariance)[is_open])
+    scale = np.outer(unit, unit)
+    prior, found, wanted = (one.covariance[which] / scale for one in (given, estimate, other))
+    inverse = np.linalg.inv(prior)
+    gradient = inverse @ ((estimate.mean - given.mean)[is_open] / unit)
+    information = inverse - inverse @ found @ inverse
+    aside, wider = (other.mean - given.mean)[is_open] / unit, wanted - prior
+    turned = np.eye(unit.size) + information @ wider
+    at_other = gradient - information @ aside
+    gradient_after, information_after = np.linalg.solve(turned, at_other), np.linalg.solve(turned, information)
+    likelier = aside @ (gradient + at_other) + at_other @ wider @ gradient_after - np.linalg.slogdet(turned)[1]
+    mean, covariance = other.mean.copy(), other.covariance.copy()
+    mean[is_open] += unit * (wanted @ gradient_after)
+    covariance[which] -= scale * (wanted @ information_after @ wanted)
+    return Remembered(mean, covariance), float(likelier) / 2.0
 
 
 def _latest(doubts: tuple[Doubt, ...]) -> list[Doubt]:
@@ -114,9 +144,8 @@ def _why_spoiled(seen: PassEstimate) -> str:
     return ""
 
 
-def _why_surprising(memory: PedestalMemory, seen: PassEstimate, settings: EstimatorSettings) -> str:
+def _why_surprising(expected: Remembered, estimate: Remembered) -> str:
     """Why a pass contradicts the memory of the mount; n + 4 sqrt(2 n) of n directions that it saw is no chance."""
-    expected, estimate = in_a_pass(memory.mount, a_priori_sigmas(settings)[1], seen.begin_tai_s), seen.mount
     prior = expected.covariance
     is_open = np.diag(prior) > 0.0
     root = np.linalg.cholesky(prior[np.ix_(is_open, is_open)] + 1e-30 * np.eye(int(is_open.sum())))
@@ -134,6 +163,8 @@ def _why_surprising(memory: PedestalMemory, seen: PassEstimate, settings: Estima
 
 
 def _preference_text(before: PedestalMemory, after: PedestalMemory) -> str:
+    if after.is_still != before.is_still:
+        return f"the zero points of the last passes {'hold still' if after.is_still else 'move, by day or in weeks'}"
     if after.has_mount == before.has_mount:
         return ""
     return (

@@ -60,7 +60,7 @@ def estimate_pass(
     if last - first < LEAST_S:
         return None
     fresh = make_prior(source, settings, first)
-    given = priors(memory, settings, first)
+    given = priors(memory, settings, first)[:2]
     batches = [Batch(source, site, settings, one.of(fresh), one.noise) for one in given]
     const, mount = (solve(batch, seen, None) for batch in batches)
     variance = np.diag(fresh.covariance)[ORBIT]
