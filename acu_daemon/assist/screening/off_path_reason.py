@@ -5,7 +5,7 @@ from math import hypot
 import numpy as np
 
 from acu_daemon.assist.reading_gate import OFF_PATH, SIDE_LOBE, WRONG_TARGET
-from acu_daemon.assist.screening.offsets import Flags, Offsets
+from acu_daemon.assist.screening.offsets import Offsets
 from acu_daemon.assist.screening_limits import (
     BEFORE_S,
     DRIFT_BEAMS_S,
@@ -15,13 +15,6 @@ from acu_daemon.assist.screening_limits import (
     SIDE_LOBE_BEAMS,
 )
 from acu_daemon.model import Readings
-
-
-def is_beside(seen: Offsets, beamwidth_deg: float) -> Flags:
-    """Whether readings are as far off as a side lobe."""
-    beams = seen.angle_deg / beamwidth_deg
-    beside: Flags = (beams >= SIDE_LOBE_BEAMS[0]) & (beams <= SIDE_LOBE_BEAMS[1])
-    return beside
 
 
 def level_db(readings: Readings, newest_s: float) -> float | None:
@@ -47,8 +40,9 @@ def reason_of(seen: Offsets, rise: float | None, beamwidth_deg: float) -> str:
     is_drift = drift_deg_s * float(np.ptp(seen.tai_s[newest])) > DRIFT_SCATTERS * scatter_deg
     if is_drift and drift_deg_s > DRIFT_BEAMS_S * beamwidth_deg and seen.tai_s.size > 2:
         return WRONG_TARGET
-    is_steady_beside = float(np.mean(is_beside(seen, beamwidth_deg)[newest])) > 0.5
-    return SIDE_LOBE if is_steady_beside and (rise is None or rise < -LOW_DB) else OFF_PATH
+    beams = seen.angle_deg[newest] / beamwidth_deg
+    is_beside = float(np.mean((beams >= SIDE_LOBE_BEAMS[0]) & (beams <= SIDE_LOBE_BEAMS[1]))) > 0.5
+    return SIDE_LOBE if is_beside and (rise is None or rise < -LOW_DB) else OFF_PATH
 
 
 def left_path_tai_s(seen: Offsets) -> float:

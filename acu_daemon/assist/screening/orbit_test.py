@@ -12,20 +12,10 @@ from acu_daemon.assist.estimators.full.estimated_states import make_prior, state
 from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
 from acu_daemon.assist.screening.offsets import Offsets, offsets
 from acu_daemon.assist.screening_limits import BEFORE_S, NARROW, NEAR_SHARE
-from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings, StateSigmas
+from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.errors import OrbitError
 from acu_daemon.model import FitResult, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
-
-
-def widened(source: Propagator, settings: EstimatorSettings, factor: float) -> EstimatorSettings:
-    """The settings with an orbit that is worth less: all its sigmas are factor times as large."""
-    sigmas = settings.sigmas_of(source.kind)
-    if isinstance(sigmas, StateSigmas):
-        wide: ElementSigmas | StateSigmas = StateSigmas(factor * sigmas.position_m, factor * sigmas.velocity_m_s)
-    else:
-        wide = ElementSigmas(*(factor * sigma for sigma in astuple(sigmas)))
-    return replace(settings, orbit_sigmas=wide, azimuth=None, elevation=None)
 
 
 def fitted(
@@ -50,8 +40,10 @@ class OrbitTest:
 
     def best_offsets(self, readings: Readings, factor: float) -> Offsets | None:
         """Offsets from the orbit that fits the readings, its sigmas factor times as large; None without one."""
+        sigmas = self._settings.sigmas_of(self._source.kind)
+        wide = replace(self._settings, orbit_sigmas=type(sigmas)(*(factor * one for one in astuple(sigmas))))
         try:
-            found = fitted(self._source, self._site, widened(self._source, self._settings, factor), readings)
+            found = fitted(self._source, self._site, wide, readings)
         except (OrbitError, np.linalg.LinAlgError):
             return None
         return None if found is None else found[1]

@@ -11,7 +11,7 @@ Readings near the path whose offsets are correlated, as those of an axis that hu
 """
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -20,7 +20,7 @@ from acu_daemon.assist import screening_limits as limits
 from acu_daemon.assist.reading_gate import ACCELERATION, BELIED, CORRELATED, OFF_PATH, WRONG_TARGET, below_highest
 from acu_daemon.assist.screening.correlated_offsets import CorrelatedOffsets
 from acu_daemon.assist.screening.off_path_reason import left_path_tai_s, reason_of, rise_db
-from acu_daemon.assist.screening.offsets import Offsets, offsets
+from acu_daemon.assist.screening.offsets import Flags, Offsets, offsets
 from acu_daemon.assist.screening.orbit_test import OrbitTest
 from acu_daemon.assist.screening.path_acceleration import is_low_acceleration
 from acu_daemon.assist.settings import EstimatorSettings
@@ -30,14 +30,6 @@ from acu_daemon.orbit.propagator import Propagator
 _NONE = Readings.of([])
 
 
-@dataclass(frozen=True, slots=True)
-class Taken:
-    """What a batch brought: readings to add to the fit, or, with is_rebuilt, that `TrackGate.kept` is another now."""
-
-    new: Readings = _NONE
-    is_rebuilt: bool = False
-
-
 class TrackGate:
     """Mutable; one owner.  `rejecting` is the reason why the newest readings are left out, "" when they are kept."""
 
@@ -45,7 +37,7 @@ class TrackGate:
         self._source, self._site, self._settings = source, site, settings
         self._orbit_test = OrbitTest(source, site, settings)
         self._correlated = CorrelatedOffsets(self._orbit_test, settings)
-        self._kept: list[Readings] = []
+        self.kept = _NONE  # all readings that are believed
         self._waiting = _NONE
         self._waiting_reason = ""
         self._is_clear = False  # when the track left the path
@@ -56,33 +48,24 @@ class TrackGate:
         self.reset_count = 0
 
     @property
-    def kept(self) -> Readings:
-        """All readings that are believed."""
-        if not self._kept:
-            return _NONE
-        self._kept = [Readings.joined(self._kept)]
-        return self._kept[0]
-
-    @property
     def counts(self) -> dict[str, int]:
         """Readings left out, by reason."""
         return dict(self._left_out + Counter({self._waiting_reason: len(self._waiting)}))
 
     def restart(self, newest_s: float) -> None:
         """Believe only the newest readings."""
-        is_new = self.kept.tai_s >= self.kept.tai_s[-1] - newest_s
-        self._leave_out(self.kept.part(~is_new), BELIED)
-        self._kept = [self.kept.part(is_new)]
+        self._keep_but(self.kept.tai_s < self.kept.tai_s[-1] - newest_s, BELIED)
 
-    def take(self, readings: Readings, fit: FitResult | None) -> Taken:
+    def take(self, readings: Readings, fit: FitResult | None) -> Readings | None:
         """Take the next readings, oldest first.  fit: to the kept ones, with a covariance; None while there are none.
 
+        Returns:  what to add to the fit; None: `kept` is another now.
         Raises:  OrbitError: the source has no answer for one of the times.
         """
         good, rejected = below_highest(readings, self._settings)
         reasons = Counter(one.reason for one in rejected)
         self._left_out += reasons
-        taken = Taken()
+        taken: Readings | None = _NONE
         if len(good):
             is_low = is_low_acceleration(self._source, self._site, fit, good.tai_s, self._settings)
             reasons[ACCELERATION] = self._leave_out(good.part(~is_low), ACCELERATION)
@@ -107,6 +90,12 @@ class TrackGate:
         self._left_out[reason] += len(readings)
         return len(readings)
 
+    def _keep_but(self, is_theirs: Flags, reason: str) -> int:
+        """Leave out some of those kept; how many."""
+        left_out = self._leave_out(self.kept.part(is_theirs), reason)
+        self.kept = self.kept.part(~is_theirs)
+        return left_out
+
     def _wait(self, readings: Readings) -> None:
         waiting = Readings.joined([self._waiting, readings])
         is_old = waiting.tai_s < readings.tai_s[-1] - limits.WAITING_S
@@ -117,36 +106,34 @@ class TrackGate:
         self._leave_out(self._waiting, self._waiting_reason)
         self._waiting, self._waiting_reason, self._is_clear = _NONE, "", False
 
-    def _believe(self, questioned: Readings, seen: Offsets) -> Taken:
+    def _believe(self, questioned: Readings, seen: Offsets) -> None:
         """Keep those of the questioned readings, the newest that wait, that are near; all others are left out."""
-        self._kept.append(questioned.part(seen.is_near))
+        self.kept = Readings.joined([self.kept, questioned.part(seen.is_near)])
         older = self._waiting.part(slice(0, len(self._waiting) - len(questioned)))
         self._waiting = Readings.joined([older, questioned.part(~seen.is_near)])
         self._end_waiting()
-        return Taken(is_rebuilt=True)
 
-    def _first(self, readings: Readings) -> Taken:
+    def _first(self, readings: Readings) -> Readings | None:
         """While nothing is kept: do the waiting readings lie on an orbit near the elements?"""
         if len(readings):
             self._wait(readings)
         if len(self._waiting) == 0:
-            return Taken()
+            return _NONE
         tail = self._waiting.tail(self._trial_s or limits.WAITING_S)
-        if self._waiting.span_s >= self._trial_s and (seen := self._orbit_test.verdict(None, tail)) is not None:
-            self._waiting_reason = WRONG_TARGET
-            return self._believe(tail, seen)
-        self._trial_s = max(self._trial_s, limits.TRIAL_S[0])
         self._waiting_reason = WRONG_TARGET
-        return Taken()
+        if self._waiting.span_s >= self._trial_s and (seen := self._orbit_test.verdict(None, tail)) is not None:
+            self._believe(tail, seen)
+            return None
+        self._trial_s = max(self._trial_s, limits.TRIAL_S[0])
+        return _NONE
 
-    def _follow(self, near: Readings, off: Readings, fit: FitResult) -> Taken:
-        if len(near):
-            self._kept.append(near)
+    def _follow(self, near: Readings, off: Readings, fit: FitResult) -> Readings | None:
+        self.kept = Readings.joined([self.kept, near])
         if len(off) <= len(near):
             if len(near):  # back on the path, or single wild readings
                 self._end_waiting()
             self._leave_out(off, OFF_PATH)
-            return Taken(near)
+            return near
         self._wait(off)
         seen = self._offsets(self._waiting, fit)
         self._waiting_reason = reason_of(seen, rise_db(self.kept, off), self._settings.beamwidth_deg)
@@ -154,13 +141,14 @@ class TrackGate:
         if not self._is_clear and self._waiting.span_s >= limits.SUSTAINED_S:
             self._is_clear = True
             is_rebuilt = self._take_back(seen, fit)
-            if not self._kept:
+            if len(self.kept) == 0:
                 self._first(_NONE)
-                return Taken(is_rebuilt=True)
+                return None
         tail = self._waiting.tail(limits.RECENT_S)
         if (judged := self._orbit_test.verdict(self.kept.tail(limits.JUDGED_S), tail)) is not None:
-            return self._believe(tail, judged)
-        return Taken(near, is_rebuilt or self._resets())
+            self._believe(tail, judged)
+            return None
+        return None if is_rebuilt or self._resets() else near
 
     def _is_correlated(self, asked: Readings, fit: FitResult) -> bool:
         """Whether the readings, with those before them, are correlated about the path; a fit to few cannot tell."""
@@ -172,13 +160,11 @@ class TrackGate:
             self.kept, partial(self._offsets, fit=path)
         )
 
-    def _leave_correlated(self, off: Readings, fit: FitResult) -> Taken:
+    def _leave_correlated(self, off: Readings, fit: FitResult) -> Readings | None:
         """Leave out what was kept of the window that is correlated; go on with the readings farther off."""
-        is_theirs = self.kept.tai_s >= self._correlated.begin_tai_s
-        has_some = self._leave_out(self.kept.part(is_theirs), CORRELATED) > 0
-        self._kept = [self.kept.part(~is_theirs)]
+        has_some = self._keep_but(self.kept.tai_s >= self._correlated.begin_tai_s, CORRELATED) > 0
         taken = self._follow(_NONE, off, fit)
-        return replace(taken, is_rebuilt=taken.is_rebuilt or has_some)
+        return None if has_some else taken
 
     def _take_back(self, seen: Offsets, fit: FitResult) -> bool:
         """Take back what was kept since a track left the path without a jump: it was on its way already."""
@@ -188,14 +174,13 @@ class TrackGate:
         is_jump = float(np.hypot(*step_deg)) > limits.JUMP_BEAMS * self._settings.beamwidth_deg
         if is_jump or seen.tai_s[0] - last.tai_s[0] > limits.MAX_GAP_S:
             return False
+        since_tai_s = left_path_tai_s(seen)
         if kept.second_count < limits.YOUNG_S:
             self._trial_s = min(max(limits.TRIAL_S[0], 2.0 * self._trial_s), limits.TRIAL_S[1])
-            self._waiting = Readings.joined([kept, self._waiting])
-            self._kept = []
-            return True
-        is_theirs = kept.tai_s >= left_path_tai_s(seen)
+            since_tai_s = -np.inf
+        is_theirs = kept.tai_s >= since_tai_s
         self._waiting = Readings.joined([kept.part(is_theirs), self._waiting])
-        self._kept = [kept.part(~is_theirs)]
+        self.kept = kept.part(~is_theirs)
         return bool(is_theirs.any())
 
     def _resets(self) -> bool:
@@ -217,8 +202,7 @@ class TrackGate:
         judged = self._orbit_test.verdict(None, tail)
         if judged is None:
             return False
-        self._leave_out(self.kept, BELIED)
-        self._kept = []
+        self._keep_but(np.ones(len(self.kept), dtype=np.bool_), BELIED)
         self.reset_count += 1
         self._believe(tail, judged)
         return True

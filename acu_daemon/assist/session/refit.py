@@ -150,11 +150,11 @@ class Refitter:
         taken = self._gate.take(batch, self._judge.fit())
         if self._gate.reset_count > reset_count:
             self._forget_resumed()
-        if taken.is_rebuilt:
+        if taken is None:
             self._begin_fit()
-        elif len(taken.new):
+        elif len(taken):
             for estimator in self._estimators:
-                estimator.add(taken.new)
+                estimator.add(taken)
 
     def _drop_carried(self) -> tuple[str, ...]:
         """A fresh start that began with the same orbit would end as badly."""
