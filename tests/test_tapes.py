@@ -3,9 +3,11 @@
 import gzip
 import json
 import time
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from command_line import acu_daemon
 from fault_tapes import TROUBLES, path_of
@@ -20,6 +22,7 @@ from acu_daemon.daemon.area import CommonArea
 from acu_daemon.edge.tape import Record
 from acu_daemon.edge.tape_file import SUFFIX, read_tape
 
+ROUNDING = 1e-5  # relative: the linear algebra of another kind of processor rounds otherwise, 4e-7 was seen
 FLUSH_S = 1.0  # what a daemon that is killed may lose
 
 
@@ -57,11 +60,22 @@ def test_a_recording_with_a_fault_gives_every_command_again(name: str) -> None:
     assert done.replay.fit_count > 5
 
 
+def numbers(fit: Any) -> list[float]:
+    """All numbers of a fit, in the order of its fields."""
+    if is_dataclass(fit):
+        return [number for field in fields(fit) for number in numbers(getattr(fit, field.name))]
+    if isinstance(fit, tuple | list | np.ndarray):
+        return [number for one in fit for number in numbers(one)]
+    return [float(fit)] if isinstance(fit, int | float) else []
+
+
 def test_the_fits_are_computed_again_to_the_same_numbers() -> None:
     recorded, anew = States(), States()
     replay_pass(path_of("silence-of-the-line"), recorded)
     assert replay_pass(path_of("silence-of-the-line"), anew, fits_anew=True).difference is None
-    assert [one.fit for one in anew.fits] == [one.fit for one in recorded.fits]
+    for once_more, one in zip(anew.fits, recorded.fits, strict=True):
+        assert numbers(once_more.fit) == pytest.approx(numbers(one.fit), rel=ROUNDING, abs=0.0)
+    assert len(numbers(anew.fits[-1].fit)) > 150
     assert len(anew.fits) > 5
 
 
