@@ -13,6 +13,7 @@ from memories import Judge, remembering
 from acu_daemon.acu.commands import AcuMode, Backup
 from acu_daemon.acu.replies import AcuStatus
 from acu_daemon.control.control_config import ControlConfig
+from acu_daemon.control.safety.axis_latch import watch_antenna
 from acu_daemon.control.safety.axis_watch import AxesWatch, AxisSeen, Bounds, Duty, sky_scale, watch_axes
 from acu_daemon.control.safety.encoder_watch import FROZEN_DEG, EncoderWatch, watch_encoders
 from acu_daemon.control.safety.status_plausibility import CONFIRMED_COUNT, CONFIRMED_DEG, RATE_MARGIN, SLACK_DEG
@@ -275,6 +276,27 @@ def test_p6_an_azimuth_is_judged_by_its_angle_on_the_sky(el_deg: float, side: in
                 watch, problem = watch_axes(watch, status, az, el, (wide, wide), bounds)
                 problems.add(problem)
             assert (problems != {""}) == is_wrong, duty
+
+
+@pytest.mark.parametrize("el_deg", ELEVATIONS_DEG)
+@pytest.mark.parametrize("side", [-1, 1])
+def test_p6_a_latch_waits_for_an_azimuth_that_is_a_degree_behind_on_the_sky(el_deg: float, side: int) -> None:
+    """The same by the memory of a tick: readings as they come, and the command in force."""
+    bounds = CONFIG.following
+    status = replace(IN_REMOTE, az_deg=100.0, el_deg=el_deg)
+    for share, is_wrong in ((0.9, False), (1.1, True)):
+        behind_deg = side * share * bounds.error_deg / scale_of(el_deg)
+        state, problems = remembering(stage=StartStage.READY, track=TrackState.HOLD_FITTED), set()
+        for k in range(60):
+            now = NOW + 0.1 * k
+            readings = tuple((now - 0.1 * back, 100.0, el_deg) for back in (2, 1, 0))
+            state = remembering(
+                state, az_deg=100.0, track_of_readings=readings, in_force=(now, 100.0 + behind_deg, el_deg)
+            )
+            seen = Observation(reading=Reading(now, 100.0, el_deg, False), status=status)
+            state, problem = watch_antenna(state, seen, CONFIG)
+            problems.add(problem)
+        assert (problems != {""}) == is_wrong, (share, problems)
 
 
 @el_places

@@ -16,6 +16,7 @@ from acu_daemon.assist.estimators.full.full_estimator import FullEstimator
 from acu_daemon.assist.mount_model import encoder_look
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.cli.simulated import station_air
+from acu_daemon.config.antenna_tables import SCALE_SIGMA, AtmosphereSection
 from acu_daemon.config.to_settings import estimator_settings
 from acu_daemon.control.tracking.pass_plan import plan_pass
 from acu_daemon.edge.carry_over_file import from_json, to_json
@@ -84,6 +85,15 @@ def test_the_low_bias_of_a_fit_is_a_scale_of_the_refraction_with_the_rate_of_it(
     plain = encoder_look(SOURCE, tai_s, IN_AIR, None)
     assert np.abs(by_fit.el_deg - by_model.el_deg).max() < 0.03 * np.abs(by_model.el_deg - plain.el_deg).max()
     assert np.abs(rates_off(IN_AIR, tai_s, fit)[1] - rates_off(IN_VACUUM, tai_s, None)[1]).max() < RATES_DEG_S
+
+
+def test_how_well_the_air_is_known_is_a_share_of_what_it_raises_at_45_deg() -> None:
+    section = AtmosphereSection()
+    air = section.traced(STATION)
+    assert air is not None
+    raised_deg = float(air.raised_deg(np.array(45.0), np.inf)[0])
+    assert section.cot_sigma_deg(STATION) == pytest.approx(SCALE_SIGMA * raised_deg, rel=0.02)
+    assert AtmosphereSection(refraction=False).cot_sigma_deg(STATION) == 0.0
 
 
 @pytest.mark.parametrize("sigma_deg", [0.0, 0.002])

@@ -26,7 +26,7 @@ from acu_daemon.acu.replies import AcuStatus, Commanded, Refused
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.extra_exchange import EXTRA_REPEAT_S, REFUSED_EXTRA_S
 from acu_daemon.control.orders import Orders
-from acu_daemon.control.registers import REFUSED_PAUSE_S
+from acu_daemon.control.registers import CALM_SHARE, REFUSED_PAUSE_S
 from acu_daemon.control.safety.command_permit import permit
 from acu_daemon.control.state import ControlState, Lag, StartStage
 from acu_daemon.control.tick import tick
@@ -46,11 +46,11 @@ AZ_DEG, EL_DEG, AZ_RATE, EL_RATE = 100.0, 40.0, 0.5, 0.3
 LEAD_S = CONFIG.effect_delay_s + CONFIG.period_s / 2
 
 
-def path(kind: str = "TLE") -> Prediction:
+def path(kind: str = "TLE", az_rate_deg_s: float = AZ_RATE, el_rate_deg_s: float = EL_RATE) -> Prediction:
     """A straight path through AZ_DEG, EL_DEG at NOW."""
     t = np.arange(-10, 900) * 0.1
-    az, el = AZ_DEG + AZ_RATE * t, EL_DEG + EL_RATE * t
-    az_rate, el_rate = np.full(t.size, AZ_RATE), np.full(t.size, EL_RATE)
+    az, el = AZ_DEG + az_rate_deg_s * t, EL_DEG + el_rate_deg_s * t
+    az_rate, el_rate = np.full(t.size, az_rate_deg_s), np.full(t.size, el_rate_deg_s)
     return Prediction(NOW - 1.0, 0.1, az, el, az_rate, el_rate, az, az_rate, kind, NOW)  # type: ignore[arg-type]
 
 
@@ -130,6 +130,25 @@ def test_a_lag_is_learned_only_from_writes_that_come_a_period_apart(gap_s: float
         state, _ = tick(state, TickInput(Observation(reading=reading, status=seen), FITTED, now_tai_s), CONFIG)
     assert (state.lag.az.count > 0) is is_learned
     assert (state.lag.el.count > 0) is is_learned
+
+
+@pytest.mark.parametrize("axis", ["azimuth", "elevation"])
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize(("share", "is_learned"), [(0.9, True), (1.1, False)])
+def test_a_lag_is_learned_only_where_the_drive_can_follow_whichever_way_it_turns(
+    axis: str, side: int, share: float, is_learned: bool
+) -> None:
+    rate_deg_s = side * share * CALM_SHARE * getattr(CONFIG, axis).max_rate_deg_s
+    az_rate, el_rate = (rate_deg_s, 0.0) if axis == "azimuth" else (0.0, rate_deg_s)
+    sky = Sky(path("FITTED", az_rate, el_rate), None, PLAN)
+    state = remembering(ready(TrackState.HOLD_FITTED, status(AcuMode.REMOTE_BACKUP)), hold_from_tai_s=NOW)
+    for k in range(25):
+        seen = replace(
+            status(AcuMode.REMOTE_BACKUP), az_deg=AZ_DEG + az_rate * 0.1 * k, el_deg=EL_DEG + el_rate * 0.1 * k
+        )
+        reading = Reading(NOW + 0.1 * (k - 1), seen.az_deg, seen.el_deg, is_locked=False)
+        state, _ = tick(state, TickInput(Observation(reading=reading, status=seen), sky, NOW + 0.1 * k), CONFIG)
+    assert state.registers.commands[-1].is_free is is_learned
 
 
 def test_a_latch_forgets_the_lag_that_was_learned_of_an_axis_that_failed() -> None:
