@@ -77,6 +77,13 @@ def test_a_skyline_of_one_point_is_level_and_of_none_or_two_at_one_azimuth_is_re
             skyline_of(points)
 
 
+@pytest.mark.parametrize("ends_deg", [(0.0, 0.0), (0.0, 360.0), (30.0, 30.0), (-90.0, 270.0)])
+def test_a_box_whose_azimuths_are_the_same_twice_keeps_the_beam_out_all_around(ends_deg: tuple[float, float]) -> None:
+    ring = KeepOut("the ring", *ends_deg, 10.0, 20.0)
+    for az_deg in range(-270, 451, 45):
+        assert [ring.clearance_deg(az_deg, el_deg) for el_deg in (4.0, 12.0, 15.0, 20.5)] == [6.0, -2.0, -5.0, 0.5]
+
+
 def test_a_box_over_north_keeps_the_beam_out_on_every_turn() -> None:
     envelope = Envelope(AZIMUTH, ELEVATION, (MAST,))
     for az_deg in (0.0, 355.0 - 360.0, 5.0, -9.0):

@@ -301,18 +301,19 @@ def test_p6_a_latch_waits_for_an_azimuth_that_is_a_degree_behind_on_the_sky(el_d
 
 @el_places
 @pytest.mark.parametrize("side", [-1, 1])
-def test_a_status_is_doubted_and_confirmed_by_its_angle_on_the_sky(el_deg: float, side: int) -> None:
+@pytest.mark.parametrize("az_deg", [0.0, 100.0])
+def test_a_status_is_doubted_and_confirmed_by_its_angle_on_the_sky(el_deg: float, side: int, az_deg: float) -> None:
     drive = AxisLimits(-270.0, 270.0, 2.0, 10.0)
-    here = AcuStatus(100.0, el_deg, AcuMode.STANDBY)
+    here = AcuStatus(az_deg, el_deg, AcuMode.STANDBY)
     cos_el = scale_of(el_deg)
     for share, is_believed in ((0.9, True), (1.1, False)):
         doubt = Judge(drive, drive)
         doubt.believes(here, NOW)
         jump_deg = share * (SLACK_DEG / cos_el + RATE_MARGIN * 0.1 * drive.max_rate_deg_s)
-        assert doubt.believes(replace(here, az_deg=(100.0 + side * jump_deg) % 360.0), NOW + 0.1) == is_believed
+        assert doubt.believes(replace(here, az_deg=(az_deg + side * jump_deg) % 360.0), NOW + 0.1) == is_believed
         doubt = Judge(drive, drive)
         for k in range(CONFIRMED_COUNT):
-            place = (100.0 + side * k * share * CONFIRMED_DEG / cos_el) % 360.0
+            place = (az_deg + side * k * share * CONFIRMED_DEG / cos_el) % 360.0
             doubt.believes(replace(here, az_deg=place), NOW + 0.1 * k)
         assert doubt.known.is_confirmed == is_believed
 

@@ -223,9 +223,15 @@ def test_a_browser_without_a_network_shows_the_page(folder: Path) -> None:
 # Losses
 
 
-def seen(t_s: float, is_acquired: bool, has_signal: bool | None = None, state: str = "HOLD/FITTED") -> SeenReading:
+def seen(
+    t_s: float,
+    is_acquired: bool,
+    has_signal: bool | None = None,
+    state: str = "HOLD/FITTED",
+    agc_db: float | None = None,
+) -> SeenReading:
     signal = is_acquired if has_signal is None else has_signal
-    return SeenReading(t_s, 10.0, 20.0, signal, is_acquired, None, state, 0.1 * t_s, None)
+    return SeenReading(t_s, 10.0, 20.0, signal, is_acquired, agc_db, state, 0.1 * t_s, None)
 
 
 def test_the_plan_of_the_report_is_the_one_with_which_the_pass_began() -> None:
@@ -245,6 +251,15 @@ def test_a_loss_ends_when_the_signal_is_back_and_relock_is_what_autotrack_took_f
     assert (loss.start_tai_s, loss.length_s, loss.relock_s) == pytest.approx((1.0, 2.0, 0.7))
     assert loss.largest_off_deg == pytest.approx(0.36)
     assert loss.followed == (("HOLD/FITTED", 1.0),)
+
+
+@pytest.mark.parametrize(("below_db", "is_back"), [(2.9, True), (3.1, False)])
+def test_a_signal_is_back_by_a_level_within_3_db_of_autotracks(below_db: float, is_back: bool) -> None:
+    before = [seen(0.1 * k, is_acquired=True, agc_db=level_db) for k, level_db in enumerate((9.0, 8.0, 7.0, 8.0))]
+    silent = [seen(0.4 + 0.1 * k, is_acquired=False, agc_db=0.0) for k in range(16)]
+    level = [seen(2.0 + 0.1 * k, is_acquired=False, agc_db=8.0 - below_db) for k in range(5)]
+    (loss,) = losses_of([*before, *silent, *level, seen(2.5, is_acquired=True, agc_db=8.0)])
+    assert (loss.length_s, loss.relock_s) == pytest.approx((1.6, 0.5) if is_back else (2.1, 0.0))
 
 
 def test_one_reading_without_the_bit_is_no_loss_and_one_that_does_not_end_has_no_length() -> None:

@@ -143,7 +143,9 @@ def test_hamlibs_dummy_is_simulated_and_its_limits_are_known() -> None:
     assert isinstance(reply, AcuIdentity)
     assert reply.is_simulated
     assert beyond_own_limits(reply, AxisLimits(-180, 450, 6, 6), AxisLimits(0, 90, 3, 3)) == ""
-    assert "set min_deg and max_deg" in beyond_own_limits(reply, AxisLimits(-181, 450, 6, 6), AxisLimits(0, 90, 3, 3))
+    for beyond in ((-181, 450, 0, 90), (-180, 451, 0, 90), (-180, 450, -1, 90), (-180, 450, 0, 181)):
+        azimuth, elevation = AxisLimits(*beyond[:2], 6, 6), AxisLimits(*beyond[2:], 3, 3)
+        assert beyond_own_limits(reply, azimuth, elevation).count("set min_deg and max_deg") == 1, beyond
 
 
 def test_a_server_of_protocol_0_tells_the_same_without_an_end() -> None:

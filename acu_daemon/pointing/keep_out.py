@@ -48,7 +48,7 @@ class KeepOut:
         return ((self.az_to_deg - self.az_from_deg) % WHOLE_TURN_DEG or WHOLE_TURN_DEG) / 2.0
 
     def clearance_deg(self, az_deg: float, el_deg: float) -> float:
-        half_deg = ((self.az_to_deg - self.az_from_deg) % WHOLE_TURN_DEG or WHOLE_TURN_DEG) / 2.0
+        half_deg = self.half_width_deg
         over_deg = max(self.el_from_deg - el_deg, el_deg - self.el_to_deg)
         if half_deg >= 180.0:
             return over_deg
