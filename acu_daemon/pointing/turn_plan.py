@@ -9,7 +9,7 @@ is found on the wrong turn in mid-pass weighs unwinding now against what it woul
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from math import ceil, floor
+from math import ceil, floor, inf
 
 import numpy as np
 import numpy.typing as npt
@@ -91,16 +91,22 @@ def _least(
 ) -> tuple[Array, npt.NDArray[np.int64]]:
     """The least cost from each instant on, on each turn, (turns, N + 1), and the turn that is taken there."""
     count, size = is_reached.shape
-    passed_s = np.concatenate(([0.0], np.cumsum(seen_s)))
-    cost, then = np.zeros((count, size + 1)), np.zeros((count, size), dtype=np.int64)
-    turns = np.arange(count)
+    passed_s, lost_s = np.concatenate(([0.0], np.cumsum(seen_s))).tolist(), seen_s.tolist()
+    reached, ahead = is_reached.tolist(), np.maximum(steps, 1).tolist()  # lists: an array of a few turns costs more
+    travel_s = (TRAVEL_COST_S_DEG * travel_deg).tolist()
+    cost, then = [[0.0] * (size + 1) for _ in range(count)], [[0] * size for _ in range(count)]
     for i in range(size - 1, -1, -1):
-        to = np.minimum(i + np.maximum(steps, 1), size)
-        ways = passed_s[to] - passed_s[i] + cost[turns, to] + TRAVEL_COST_S_DEG * travel_deg
-        ways[turns, turns] = np.where(is_reached[:, i], 0.0, seen_s[i]) + cost[:, i + 1]
-        best = np.argmin(ways - 1e-12 * np.eye(count), axis=1)  # as good as staying is staying
-        cost[:, i], then[:, i] = ways[turns, best], best
-    return cost, then
+        for k in range(count):
+            least_s, stays_s = inf, (0.0 if reached[k][i] else lost_s[i]) + cost[k][i + 1]
+            for n in range(count):
+                if n == k:
+                    way_s, weighed_s = stays_s, stays_s - 1e-12  # as good as staying is staying
+                else:
+                    to = min(i + ahead[k][n], size)
+                    way_s = weighed_s = passed_s[to] - passed_s[i] + cost[n][to] + travel_s[k][n]
+                if weighed_s < least_s:
+                    least_s, cost[k][i], then[k][i] = weighed_s, way_s, n
+    return np.array(cost), np.array(then)
 
 
 def _first(ask: TurnAsk, offset_deg: float, k: int, cost: Array, seen_s: Array, step_s: float) -> float:

@@ -10,6 +10,7 @@ P.453's exponential of 7.35 km as the other profile.
 
 from bisect import bisect_left
 from dataclasses import dataclass
+from functools import lru_cache
 from math import atan2, degrees, exp, sqrt
 from typing import Literal
 
@@ -69,6 +70,7 @@ class SimulatedAir:
         return geometric_el_deg + low_up_deg + share * (high_up_deg - low_up_deg)
 
 
+@lru_cache(maxsize=16)
 def simulated_air(
     pressure_hpa: float,
     temperature_c: float,
