@@ -23,6 +23,17 @@ ROOT = Path(__file__).resolve().parents[1]
 COMMANDS = ("run", "fake-acu", "demo", "passes", "check", "replay", "arm", "disarm", "clear", "status")
 
 
+@pytest.mark.parametrize(("is_stopped", "code"), [(True, 0), (False, 1)])
+def test_a_safe_stop_tells_by_its_status_whether_it_was_acknowledged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_stopped: bool, code: int
+) -> None:
+    async def stop(_station: object) -> bool:
+        return is_stopped
+
+    monkeypatch.setattr("acu_daemon.cli.safe_stop._stop", stop)
+    assert acu_daemon("safe-stop", "--config", write(tmp_path)).code == code
+
+
 @pytest.mark.parametrize(
     ("error", "code"),
     [

@@ -138,6 +138,17 @@ def test_a_latch_is_told_of_its_own_axis_or_of_both(latch: str, azimuth: int, el
     assert found['acu_axis_latched{axis="elevation"}'] == elevation
 
 
+@pytest.mark.parametrize(
+    ("command_deg", "measured_deg", "error_deg"), [(725.0, 6.0, -1.0), (-2.0, 357.0, 1.0), (1.0, 359.0, 2.0)]
+)
+def test_a_following_error_is_the_same_on_every_turn(command_deg: float, measured_deg: float, error_deg: float) -> None:
+    tally = Tally()
+    seen = replace(numbered(), command_az_deg=command_deg, az_deg=measured_deg, acu_mode="REMOTE")
+    tally.see(seen, RunFigures())
+    found = values(render(tally, Surroundings(), NOW))
+    assert found['acu_axis_following_error_degrees{axis="azimuth"}'] == pytest.approx(error_deg)
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(("from_deg", "to_deg"), [(10.0, 350.0), (350.0, 10.0), (100.0, 80.0), (80.0, 100.0)])
 def test_the_way_of_an_azimuth_is_counted_over_north_and_to_both_sides(

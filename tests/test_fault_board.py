@@ -131,3 +131,20 @@ def test_the_control_port_adds_lists_and_clears() -> None:
     assert answers[8] == "error refuse: this program and this link cannot do that"
     assert all(answer.startswith("error ") for answer in answers[8:12])
     assert "xor-blind" in answers[12]
+
+
+@pytest.mark.parametrize("axes", ["azimuth", "elevation", "both"])
+def test_a_frozen_encoder_keeps_showing_the_angle_of_its_own_axis(axes: str) -> None:
+    async def main() -> None:
+        bench, board = Bench(), FaultBoard()
+        break_acu(bench.acu, board, LoopClock(bench.tai_s))
+        board.add(parse_fault(f"frozen-encoder axis={axes} duration_s=1"))
+        await asyncio.sleep(0.5)
+        antenna = bench.acu.antenna
+        assert antenna.az.angle_deg != antenna.el.angle_deg
+        assert antenna.trouble.frozen_az_deg == (None if axes == "elevation" else antenna.az.angle_deg)
+        assert antenna.trouble.frozen_el_deg == (None if axes == "azimuth" else antenna.el.angle_deg)
+        await asyncio.sleep(1.0)
+        assert (antenna.trouble.frozen_az_deg, antenna.trouble.frozen_el_deg) == (None, None)
+
+    run_virtual(main())

@@ -19,7 +19,7 @@ from typing import Any
 import aiohttp
 import pytest
 from command_line import acu_daemon
-from flights import DEMO_ANTENNA, DEMO_TAI_S, demo_target, sky_of
+from flights import DEMO_ANTENNA, DEMO_TAI_S, climb, demo_target, sky_of
 from script_modules import load
 from test_live_line import SEEN
 
@@ -155,6 +155,13 @@ def test_counts_of_the_next_run_are_added_to_those_before() -> None:
     tally.see(seen_of(tick_count=30), RunFigures(connect_count=1))
     found = values(render(tally, Surroundings(), NOW))
     assert (found["acu_ticks_total"], found["acu_link_reconnects_total"]) == (130.0, 1.0)
+
+
+def test_a_daemon_counts_each_of_its_runs_from_its_own_beginning() -> None:
+    tally = Tally()
+    runs = [climb(duration_s, tally=tally) for duration_s in (2.0, 1.0)]
+    ticks = [run.snapshots[-1].tick_count for run in runs]
+    assert tally.counts["ticks", ""] == pytest.approx(sum(ticks), abs=len(runs))
 
 
 @pytest.mark.parametrize(

@@ -256,7 +256,9 @@ async def test_a_real_broker_is_told_state_events_schedule_and_home_assistant(tm
             assert (told["event"], told["level"]) == ("signal.lost", "warning")
             station.passes = [{"satellite": "NOAA 20"}]
             assert json.loads(await following("site/dish/schedule")) == station.passes
-        async with listening(port, "site/#") as following:  # what is kept, for who comes later
+            async with listening(port, "site/#") as following:  # what is kept, for who comes later
+                assert await following("site/dish/availability") == b"online"
+        async with listening(port, "site/#") as following:
             assert await following("site/dish/availability") == b"offline"
 
 

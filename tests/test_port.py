@@ -2,13 +2,14 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 
 import pytest
 from fake_sky import AZIMUTH, ELEVATION, START_TAI_S, Star
 
-from acu_daemon.acu.commands import AcuMode, PointAndPoll, PointAt, Poll, ReadCommanded, SelectMode, Stop
-from acu_daemon.acu.replies import AcuStatus, Done, Refused
-from acu_daemon.daemon.port import FIRST_POLL_S, AcuPort
+from acu_daemon.acu.commands import AcuMode, Command, PointAndPoll, PointAt, Poll, ReadCommanded, SelectMode, Stop
+from acu_daemon.acu.replies import AcuStatus, Done, Refused, Reply
+from acu_daemon.daemon.port import FIRST_POLL_S, AcuPort, Answer
 from acu_daemon.daemon.stopping import DEADLINE_S, stop_antenna
 from acu_daemon.drivers.sa3842.codec import CommandDecoder, encode_reply
 from acu_daemon.drivers.sa3842.messages import RegisterContents, Status, WriteAndPoll
@@ -174,6 +175,26 @@ def test_a_connection_that_was_lost_is_closed_before_the_next_one_is_opened() ->
             await asyncio.sleep(0.2)
             await port.wait_until_up()
         assert done == ["close", "open"] * 3
+
+    play(story)
+
+
+@pytest.mark.parametrize("refused_count", [0, 1, 3])
+def test_p6_a_stop_is_done_when_it_is_acknowledged_and_a_refusal_is_none(refused_count: int) -> None:
+    async def story(port: AcuPort, _link: MemoryLink, _clock: LoopClock) -> None:
+        answered = port.exchange
+        answers: list[Reply | None] = []
+
+        async def exchange(command: Command) -> Answer:
+            answer = await answered(command)
+            if isinstance(command, Stop):
+                answer = replace(answer, reply=Refused() if len(answers) < refused_count else answer.reply)
+                answers.append(answer.reply)
+            return answer
+
+        port.exchange = exchange  # type: ignore[method-assign]
+        assert await stop_antenna(port, DEADLINE_S, clears_watchdog=False)
+        assert [type(one) for one in answers] == [Refused] * refused_count + [Done]
 
     play(story)
 
