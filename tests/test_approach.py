@@ -30,13 +30,13 @@ def slow_target(**tracking: float) -> Target:
     return demo_target(azimuth=SLOW, tracking=tracking)
 
 
-def far_from_rise(before_rise_s: float, target: Target, turn_deg: float) -> Flight:
-    """Started so long before the rise, the antenna so far from its point."""
+def far_from_rise(before_rise_s: float, until_s: float, target: Target, turn_deg: float) -> Flight:
+    """Started so long before the rise and flown until so long after it, the antenna so far from its point."""
     coming = the_pass(target, DEMO_TAI_S)
     start_deg = wrap_180(coming.rise_az_deg)
     antenna = AcuChoice(azimuth_deg=start_deg + turn_deg, elevation_deg=80.0)
     begin_tai_s = coming.rise_tai_s - before_rise_s
-    return flight_of(target, begin_tai_s, before_rise_s + 60.0, antenna=antenna)
+    return flight_of(target, begin_tai_s, before_rise_s + until_s, antenna=antenna)
 
 
 def off_the_rise_point_s(flight: Flight, target: Target) -> float:
@@ -50,7 +50,7 @@ def off_the_rise_point_s(flight: Flight, target: Target) -> float:
 def test_an_azimuth_of_one_and_a_half_degrees_a_second_is_at_the_rise_point_before_the_rise(turn_deg: float) -> None:
     """It needs 127 s for the way, more than a preposition_s of 60 s."""
     target = slow_target(preposition_s=60.0)
-    flight = far_from_rise(220.0, target, turn_deg)
+    flight = far_from_rise(165.0, 8.0, target, turn_deg)
     rise_tai_s = the_pass(target, DEMO_TAI_S).rise_tai_s
     acquiring = [event for event in events_named(flight, "state.changed") if event["state"] == "ACQUIRE/TLE"]
     assert acquiring
@@ -62,7 +62,7 @@ def test_an_azimuth_of_one_and_a_half_degrees_a_second_is_at_the_rise_point_befo
 
 def test_started_too_late_it_says_how_many_seconds_and_is() -> None:
     target = slow_target()
-    flight = far_from_rise(60.0, target, -170.0)
+    flight = far_from_rise(60.0, -50.0, target, -170.0)
     (said,) = events_named(flight, "pass.late")
     assert said["late_s"] == pytest.approx(71.0, abs=1.0)
     assert said["azimuth_s"] > said["elevation_s"]
@@ -76,7 +76,7 @@ def test_started_in_mid_pass_it_says_how_long_after_the_rise_and_until_it_is_on_
     begin_tai_s = the_pass(target, DEMO_TAI_S).rise_tai_s + 60.0
     look = look_at(target.elements.propagator, np.array([begin_tai_s]), target.station.site)
     antenna = AcuChoice(azimuth_deg=wrap_180(float(look.az_deg[0])) - off_deg, elevation_deg=float(look.el_deg[0]))
-    flight = flight_of(target, begin_tai_s, 40.0, antenna=antenna)
+    flight = flight_of(target, begin_tai_s, 20.0, antenna=antenna)
     assert events_named(flight, "pass.late") == []
     (said,) = events_named(flight, "pass.joined")
     assert said["after_rise_s"] == pytest.approx(60.0, abs=3.0)
@@ -95,7 +95,7 @@ def test_in_mid_pass_the_way_goes_to_the_planned_turn_though_the_bearing_is_the_
 
 def test_preposition_s_is_a_floor_for_quick_drives() -> None:
     target = demo_target()
-    flight = far_from_rise(150.0, target, 100.0)
+    flight = far_from_rise(130.0, -115.0, target, 100.0)
     set_out = min(seen.tai_s for seen in flight.snapshots if seen.state == "PREPOSITION")
     assert set_out - the_pass(target, DEMO_TAI_S).rise_tai_s == pytest.approx(-120.0, abs=1.2)
 
