@@ -2,6 +2,7 @@
 # Needs Python 3.11 or newer with venv, nothing else.
 
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
+unset PYTHONDONTWRITEBYTECODE # without what is compiled kept, each start of a process takes three times as long
 python=${PYTHON:-python3}
 "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || {
     echo "acu-daemon needs Python 3.11 or newer; set PYTHON=/path/to/python3.11" >&2
