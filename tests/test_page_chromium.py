@@ -369,6 +369,7 @@ async def test_a_real_station_obeys_each_verb_that_is_pressed(new_tab: NewTab, t
         await tab.until(SHOWN)
         await tab.until("now.state.startsWith('AUTOTRACK')")
         await unlock(tab)
+        await tab.until("state.schedule.some((one) => one.state === 'pass')")  # its row has no button any more
         is_given_up = "state.schedule.some((one) => one.reason.startsWith('excluded'))"
         await give(tab, "#passes button[aria-label^='skip ']", is_given_up)
         await give(tab, "#passes button[aria-label^='unskip ']", f"!{is_given_up}")

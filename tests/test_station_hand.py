@@ -19,9 +19,12 @@ ENDS_S = 4.8  # minutes from START
 ACROSS_DEG = 0.4
 
 
-def test_a_pass_that_is_skipped_is_given_up_with_a_stop_and_cancelled(tmp_path: Path) -> None:
+@pytest.mark.parametrize("words", ["", f" satellite=scd at={utc_text(RISE + 30.0)}"])
+def test_a_pass_that_is_skipped_by_name_or_without_is_given_up_with_a_stop_and_cancelled(
+    tmp_path: Path, words: str
+) -> None:
     answers: list[str] = []
-    found = night(tmp_path, minutes=ENDS_S, script=[(RISE + 15.0, says("skip", answers))])
+    found = night(tmp_path, minutes=ENDS_S, script=[(RISE + 15.0, says(f"skip{words}", answers))])
     assert answers[0].startswith("ok given up: scd of ")
     assert (found.of("scd").state, found.of("scd").reason) == (PassState.CANCELLED, "skipped by a person")
     assert modes(found, RISE + 17.0, RISE + 80.0) == {AcuMode.STANDBY}

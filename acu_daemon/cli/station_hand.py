@@ -64,17 +64,19 @@ class StationHand:
         return f"ok no pass is begun until {utc_text(until_tai_s, 0)}"
 
     def _skip(self, said: Said, who: str, service: Service) -> str:
-        if not said.texts and (on := self._day.course.entry) is not None:
+        request = self._request(said, Wish.EXCLUDE) if said.texts else None
+        on = self._day.course.entry
+        if on is not None and (
+            request is None or request.is_of(on.satellite, on.rise_tai_s, on.culmination_tai_s, on.set_tai_s)
+        ):
             self._day.course.cancel(who)
             service.stop(f"skipped by {who or 'a person'}")
             return f"ok given up: {on.name}"
-        if not said.texts:
+        if request is None:
             entry = self._day.keeper.coming()
             if entry is None:
                 return "error skip: no pass is granted"
             request = PassRequest(entry.satellite, entry.culmination_tai_s, Wish.EXCLUDE)
-        else:
-            request = self._request(said, Wish.EXCLUDE)
         self._day.keeper.say(request, who)
         return f"ok not tracked: {request.satellite} at {utc_text(request.at_tai_s, 0)}; `unskip` withdraws it"
 

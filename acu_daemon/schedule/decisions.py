@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.schedule.exact_plan import AntennaPlace, Slot, best_slots, slots_of
 from acu_daemon.schedule.pass_track import PassTrack
-from acu_daemon.schedule.rules import SAME_PASS_S, PassRequest, StationRules, Wish
+from acu_daemon.schedule.rules import PassRequest, StationRules, Wish
 
 RESUMED = "gone on with after a restart"
 MUST: dict[Wish | None, str] = {Wish.FORCE: "forced by a person", Wish.GO_ON: RESUMED}
@@ -46,13 +46,10 @@ def decide(
 
 def _wish(track: PassTrack, requests: Sequence[PassRequest]) -> Wish | None:
     """The newest word about a pass."""
-    said = [one.wish for one in requests if one.satellite == track.satellite and _is_meant(track, one.at_tai_s)]
+    coming = track.coming
+    times = coming.rise_tai_s, coming.culmination_tai_s, coming.set_tai_s
+    said = [one.wish for one in requests if one.is_of(track.satellite, *times)]
     return said[-1] if said else None
-
-
-def _is_meant(track: PassTrack, at_tai_s: float) -> bool:
-    is_inside = track.coming.rise_tai_s <= at_tai_s <= track.coming.set_tai_s
-    return is_inside or abs(track.coming.culmination_tai_s - at_tai_s) < SAME_PASS_S
 
 
 def _never(track: PassTrack, rules: StationRules) -> str:

@@ -51,6 +51,11 @@ class PassRequest:
     at_tai_s: float
     wish: Wish
 
+    def is_of(self, satellite: str, rise_tai_s: float, culmination_tai_s: float, set_tai_s: float) -> bool:
+        """Whether it is about this pass."""
+        is_up = rise_tai_s <= self.at_tai_s <= set_tai_s
+        return satellite == self.satellite and (is_up or abs(culmination_tai_s - self.at_tai_s) < SAME_PASS_S)
+
 
 @dataclass(frozen=True, slots=True)
 class StationRules:
