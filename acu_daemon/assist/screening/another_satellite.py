@@ -5,12 +5,12 @@ other elements changed by what a manoeuvre can do.  What takes more is another s
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import sqrt
 
 import numpy as np
 
-from acu_daemon.assist.estimators.estimator_base import mean_motion_rad_s
-from acu_daemon.assist.estimators.full.estimated_states import ORBIT, make_prior, states_of
+from acu_daemon.assist.estimators.full.estimated_states import ORBIT, ORBIT_COUNT, states_of
 from acu_daemon.assist.screening.offsets import angles_deg
 from acu_daemon.assist.screening.orbit_test import fitted
 from acu_daemon.assist.screening_limits import (
@@ -27,11 +27,11 @@ from acu_daemon.assist.screening_limits import (
 )
 from acu_daemon.assist.settings import ElementSigmas, EstimatorSettings
 from acu_daemon.errors import OrbitError
-from acu_daemon.model import Readings, Site
+from acu_daemon.model import Correction, Readings, Site
 from acu_daemon.orbit.propagator import Propagator
-from acu_daemon.units import DEG, EARTH_RATE_RAD_S
+from acu_daemon.units import DEG, EARTH_RATE_RAD_S, Array
 
-ANOMALY = 1  # of the orbit's states
+NOT_CORRECTED = Correction()
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +47,34 @@ class Needed:
     near_share: float
 
 
+@dataclass(frozen=True)
+class _Ahead:
+    """A source whose mean anomaly is ahead, beside what a correction adds; behind the `Propagator` protocol."""
+
+    source: Propagator
+    ahead_rad: float
+    correction: Correction = NOT_CORRECTED
+
+    @property
+    def kind(self) -> str:
+        return self.source.kind
+
+    @property
+    def epoch_tai_s(self) -> float:
+        return self.source.epoch_tai_s
+
+    @cached_property
+    def _moved(self) -> Propagator:
+        ahead_rad = self.correction.delta_mean_anomaly_rad + self.ahead_rad
+        return self.source.corrected(replace(self.correction, delta_mean_anomaly_rad=ahead_rad))
+
+    def states_teme(self, tai_s: Array) -> tuple[Array, Array]:
+        return self._moved.states_teme(tai_s)
+
+    def corrected(self, correction: Correction) -> "_Ahead":
+        return replace(self, correction=correction)
+
+
 def needed(source: Propagator, site: Site, settings: EstimatorSettings, readings: Readings) -> Needed | None:
     """Fit locked readings, oldest first, and say what it took; None where they are too few to tell.
 
@@ -55,11 +83,13 @@ def needed(source: Propagator, site: Site, settings: EstimatorSettings, readings
     if len(readings) < LEAST_COUNT or float(np.ptp(readings.tai_s)) < BEFORE_S:
         return None
     few = readings.part(np.unique(np.linspace(0, len(readings) - 1, ENOUGH).astype(int)))
-    along_s = _nearest_along_s(source, site, few)
-    sigmas = _of_a_manoeuvre(float(mean_motion_rad_s(*source.states_teme(few.tai_s[:1]))[0]))
-    wide = replace(settings, orbit_sigmas=sigmas, station_sigma_m=0.0)
+    rate_rad_s = _rate_rad_s(source, float(few.tai_s[0]))
+    along_s = _nearest_along_s(source, site, few, rate_rad_s)
+    moved = _Ahead(source, -along_s * rate_rad_s)
+    sigmas = _of_a_manoeuvre(rate_rad_s)
+    wide = replace(settings, orbit_sigmas=sigmas, azimuth=None, elevation=None, station_sigma_m=0.0)
     try:
-        found = fitted(source, site, wide, _earlier(few, along_s))
+        found = fitted(moved, site, wide, few)
     except (OrbitError, np.linalg.LinAlgError):
         return Needed(along_s, np.inf, 0.0)
     if found is None:
@@ -67,11 +97,9 @@ def needed(source: Propagator, site: Site, settings: EstimatorSettings, readings
     fit, seen = found
     x = states_of(fit.correction, fit.bias, fit.station_shift_enu_m)[ORBIT]
     late_s = along_s + fit.along_s
-    turned_rad = -EARTH_RATE_RAD_S * late_s  # the Earth, meanwhile: no change of the node
-    x[0] -= np.clip(x[0], min(0.0, turned_rad), max(0.0, turned_rad))
-    of_one = x / np.sqrt(np.diag(make_prior(source, wide, fit.at_tai_s).covariance)[ORBIT])
-    others = np.delete(of_one, ANOMALY)
-    return Needed(late_s, sqrt(float(np.mean(others**2))), float(np.mean(seen.is_near)))
+    of_clock_rad = EARTH_RATE_RAD_S * late_s
+    x[0] -= np.clip(x[0], min(0.0, of_clock_rad), max(0.0, of_clock_rad))
+    return Needed(late_s, _manoeuvres(x, sigmas), float(np.mean(seen.is_near)))
 
 
 def why_not_this_satellite(source: Propagator, site: Site, settings: EstimatorSettings, locked: Readings) -> str:
@@ -93,15 +121,17 @@ def why_not_this_satellite(source: Propagator, site: Site, settings: EstimatorSe
     )
 
 
-def _earlier(readings: Readings, late_s: float) -> Readings:
-    """Readings as a clock that is late by late_s has them, or, but for the Earth's turn, of a satellite that late."""
-    return replace(readings, tai_s=readings.tai_s - late_s)
+def _rate_rad_s(source: Propagator, tai_s: float) -> float:
+    (r,), (v,) = source.states_teme(np.array([tai_s]))
+    return float(np.linalg.norm(np.cross(r, v)) / (r @ r))
 
 
-def _nearest_along_s(source: Propagator, site: Site, readings: Readings) -> float:
+def _nearest_along_s(source: Propagator, site: Site, readings: Readings, rate_rad_s: float) -> float:
     """How late the satellite is where its path comes nearest to the readings."""
     late_s = np.arange(-SEARCH_S, SEARCH_S + STEP_S, STEP_S)
-    off_deg = [float(np.median(angles_deg(source, site, None, _earlier(readings, one)))) for one in late_s.tolist()]
+    off_deg = [
+        float(np.median(angles_deg(_Ahead(source, -one * rate_rad_s), site, None, readings))) for one in late_s.tolist()
+    ]
     return float(late_s[int(np.argmin(off_deg))])
 
 
@@ -116,3 +146,17 @@ def _of_a_manoeuvre(rate_rad_s: float) -> ElementSigmas:
         e_vector=2.0 * share,
         inclination_deg=share / DEG,
     )
+
+
+def _manoeuvres(x: Array, sigmas: ElementSigmas) -> float:
+    of_one = np.array(
+        [
+            sigmas.raan_deg * DEG,
+            np.inf,
+            sigmas.mean_motion_rad_min / 60.0,
+            sigmas.e_vector,
+            sigmas.e_vector,
+            sigmas.inclination_deg * DEG,
+        ]
+    )
+    return sqrt(float(np.sum((x / of_one) ** 2)) / (ORBIT_COUNT - 1))
