@@ -60,7 +60,7 @@ def test_an_azimuth_of_one_and_a_half_degrees_a_second_is_at_the_rise_point_befo
     assert min(seen.tai_s for seen in flight.snapshots if seen.state == "PREPOSITION") < rise_tai_s - 138.0
 
 
-def test_started_too_late_it_says_how_many_seconds_and_is() -> None:
+def test_started_too_late_it_says_how_many_seconds_and_sets_out_at_once() -> None:
     target = slow_target()
     flight = far_from_rise(60.0, -50.0, target, -170.0)
     (said,) = events_named(flight, "pass.late")
