@@ -11,10 +11,13 @@ from acu_daemon.units import Array
 EPOCH_TAI_S = tai_from_utc("2018-12-25T01:40:00Z")
 
 
-def circular(i_deg: float = 98.6, e: float = 0.0001, a_km: float = 7180.0) -> BrouwerPropagator:
-    """An orbit that passes its ascending node, at longitude 0, at EPOCH_TAI_S."""
-    raan = float(gmst_rad(np.array([EPOCH_TAI_S]), 0.0)[0])
-    elements = BrouwerElements("MADE", EPOCH_TAI_S, a_km * 1e3, e, np.radians(i_deg), raan, 0.0, 0.0)
+def circular(
+    i_deg: float = 98.6, e: float = 0.0001, a_km: float = 7180.0, *, is_descending: bool = False
+) -> BrouwerPropagator:
+    """An orbit that passes its ascending node, or the other one, at longitude 0, at EPOCH_TAI_S."""
+    half_turn = np.pi if is_descending else 0.0
+    raan = float(gmst_rad(np.array([EPOCH_TAI_S]), 0.0)[0]) + half_turn
+    elements = BrouwerElements("MADE", EPOCH_TAI_S, a_km * 1e3, e, np.radians(i_deg), raan, 0.0, half_turn)
     return BrouwerPropagator(elements, short_period=False)
 
 

@@ -30,8 +30,9 @@ def _part(readings, start, end):
 
 @pytest.mark.parametrize("name", ["deterministic", "kalman"])
 @pytest.mark.parametrize(("i_deg", "e"), [(23.8, 0.0436), (66.0, 0.001), (98.6, 0.0001), (144.0, 0.02)])
-def test_readings_without_noise_give_back_the_true_correction(name, i_deg, e):
-    source, where = circular(i_deg, e), site()
+@pytest.mark.parametrize("is_descending", [False, True])
+def test_readings_without_noise_give_back_the_true_correction(name, i_deg, e, is_descending):
+    source, where = circular(i_deg, e, is_descending=is_descending), site()
     estimator = make_estimator(name, source, where, SETTINGS)
     estimator.add(_readings(source, where))
     fit = estimator.fit()
@@ -41,14 +42,17 @@ def test_readings_without_noise_give_back_the_true_correction(name, i_deg, e):
     assert fit.residual_rms_deg < 1e-4
 
 
-def test_circular_gives_back_the_true_correction_of_a_circular_orbit():
-    source, where = circular(66.0, 0.0), site()
+@pytest.mark.parametrize("is_descending", [False, True])
+def test_circular_gives_back_the_true_correction_of_a_circular_orbit_all_along_it(is_descending):
+    source, where = circular(66.0, 0.0, is_descending=is_descending), site()
     estimator = make_estimator("circular", source, where, SETTINGS)
-    estimator.add(_readings(source, where))
-    fit = estimator.fit()
-    assert fit is not None
-    assert fit.correction.delta_raan_rad == pytest.approx(TRUE.delta_raan_rad, abs=2e-4 * DEG)
-    assert fit.correction.delta_mean_anomaly_rad == pytest.approx(TRUE.delta_mean_anomaly_rad, abs=2e-4 * DEG)
+    readings = _readings(source, where)
+    for start in range(0, len(readings), 8):
+        estimator.add(_part(readings, start, start + 8))
+        fit = estimator.fit()
+        assert fit is not None
+        assert fit.correction.delta_raan_rad == pytest.approx(TRUE.delta_raan_rad, abs=2e-4 * DEG)
+        assert fit.correction.delta_mean_anomaly_rad == pytest.approx(TRUE.delta_mean_anomaly_rad, abs=2e-4 * DEG)
 
 
 def test_circular_averages_the_last_eight_inversions_and_needs_three():

@@ -72,6 +72,7 @@ def test_the_standard_air_has_no_steps_in_latitude_and_thins_with_height() -> No
     latitudes = np.arange(-90.0, 90.5, 0.5)
     n = [refractivity(standard_air(Station("s", float(latitude), 0.0, 0.0))) for latitude in latitudes]
     assert max(abs(np.diff(n))) < 2.0
+    assert n == n[::-1]  # south as north
     assert min(n) > 300.0 and max(n) < 390.0  # P.453's maps of the year's mean at sea level
     high = standard_air(Station("s", 0.0, 0.0, 3000.0))
     assert refractivity(high) < 0.65 * refractivity(standard_air(Station("s", 0.0, 0.0, 0.0)))

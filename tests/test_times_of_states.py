@@ -56,6 +56,17 @@ def test_autotrack_has_its_time_for_a_signal_from_the_rise_or_from_its_selection
 
 
 @pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize("along_s", [0.0, 7.0, -7.0])
+def test_a_pass_ends_early_and_late_as_the_fit_says(along_s: float, side: int) -> None:
+    fit = FitResult("full", Correction(), 0.0, 9, 0, 0.0, along_s, 0.0)
+    seen = status(AcuMode.ACQUIRE)
+    after_s = 1.0 + along_s + side * MOMENT_S
+    given = TickInput(saw(seen), Sky(path("full"), fit, replace(RISING, set_tai_s=NOW - after_s)), NOW)
+    causes = find_causes(ready(TrackState.HOLD_FITTED, seen), given, LIMITS)
+    assert (Cause.PASS_OVER in causes) == (side > 0)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
 @pytest.mark.parametrize("track", sorted(HOLDING))
 def test_a_hold_has_its_time_and_a_glimpse_that_never_locked_that_of_autotrack(track: TrackState, side: int) -> None:
     is_over = {Cause.HOLD_OVER} if side > 0 else set()
