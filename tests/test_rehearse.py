@@ -6,10 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from command_line import acu_daemon
 from config_files import BROUWER, STATION, replaced, write
 
+from acu_daemon.assist.mount_model import encoder_look
 from acu_daemon.cli import rehearse
 from acu_daemon.cli.options import Target, coming_pass, load_target
 from acu_daemon.errors import UsageError
@@ -86,6 +88,25 @@ def test_an_acu_that_is_not_simulated_here_is_said(tmp_path: Path) -> None:
     done = acu_daemon("rehearse", "--config", config, "--satellite", "scd")
     assert done.code == 2
     assert 'dialect = "rotctl"' in done.err
+
+
+@pytest.mark.parametrize("skip", range(8))
+def test_the_antenna_of_a_rehearsal_stands_on_a_turn_that_holds_the_pass(tmp_path: Path, skip: int) -> None:
+    flown = rehearse._planned(scd(tmp_path), NOW, 2.0, None, skip, tmp_path)
+    az_deg, el_deg = rehearse._first_direction(flown)
+    assert flown.target.station.acu.azimuth.limits() == rehearse.AxisLimits(-270.0, 270.0, 20.0, 10.0)
+    look = encoder_look(
+        flown.target.elements.propagator,
+        np.arange(flown.coming.rise_tai_s, flown.coming.set_tai_s, 1.0),
+        flown.target.station.site,
+        None,
+    )
+    path_deg = np.degrees(np.unwrap(np.radians(look.az_deg)))
+    path_deg += az_deg - path_deg[0]
+    assert (az_deg - float(look.az_deg[0])) % 360.0 == pytest.approx(0.0, abs=1e-6)
+    assert el_deg == pytest.approx(float(look.el_deg[0]))
+    assert path_deg.min() >= -270.0
+    assert path_deg.max() <= 270.0
 
 
 @pytest.mark.realtime

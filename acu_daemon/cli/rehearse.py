@@ -26,6 +26,7 @@ from acu_daemon.cli.options import (
 )
 from acu_daemon.cli.page import Web
 from acu_daemon.cli.run import command as run
+from acu_daemon.control.tracking.pass_plan import plan_pass
 from acu_daemon.daemon.words import clock_text
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.errors import AcuDaemonError, UsageError
@@ -183,11 +184,15 @@ def _losses(flown: Rehearsal) -> str:
 
 
 def _first_direction(flown: Rehearsal) -> tuple[float, float]:
-    """Where the satellite is first, as far as the axes reach, in degrees of the encoders."""
+    """Where the satellite is first, as far as the axes reach, in degrees of the encoders, on the turn for this pass."""
     begin_tai_s = max(flown.start_tai_s, flown.coming.rise_tai_s)
-    seen = apparent_at(flown.target.elements.propagator, np.array([begin_tai_s]), flown.target.station.site)
-    azimuth, elevation = flown.target.station.acu.azimuth.limits(), flown.target.station.acu.elevation.limits()
-    return _held(_in_the_middle(float(seen.az_deg[0]), azimuth), azimuth), _held(float(seen.el_deg[0]), elevation)
+    source, station = flown.target.elements.propagator, flown.target.station
+    azimuth, elevation = station.acu.azimuth.limits(), station.acu.elevation.limits()
+    seen = apparent_at(source, np.array([begin_tai_s]), station.site)
+    stands_deg = _in_the_middle(float(seen.az_deg[0]), azimuth)
+    plan = plan_pass(source, station.site, flown.coming, stands_deg, azimuth, begin_tai_s, elevation=elevation)
+    turn_deg = 360.0 * round((plan.start_az_deg - stands_deg) / 360.0)
+    return _held(stands_deg + turn_deg, azimuth), _held(float(seen.el_deg[0]), elevation)
 
 
 def _in_the_middle(az_deg: float, limits: AxisLimits) -> float:
