@@ -10,6 +10,7 @@ from pathlib import Path
 import made_oems
 import numpy as np
 import pytest
+from command_line import acu_daemon
 from made_aems import kvn, quaternions
 from made_element_sets import omm_text
 from onboard_tasks import made_scenario, made_task
@@ -95,6 +96,17 @@ def test_the_command_writes_draws_and_checks(tmp_path: Path) -> None:
     wrong = onboard("check", out)
     assert wrong.returncode == 1
     assert "azimuth joints" in wrong.stderr
+
+
+def test_a_file_is_checked_against_the_margin_that_it_was_made_with(tmp_path: Path) -> None:
+    path, out = pass_file(tmp_path), tmp_path / "pass.tpf"  # whose margin is 2 deg
+    made = acu_daemon("onboard", "profile", path, "--margin-deg", "3", "--out", out)
+    assert made.code == 0, made.err
+    text = out.read_text()
+    for margin, code in (("3", 0), ("2.5", 1)):
+        out.write_text(re.sub(r"(MARGIN_DEG\s*=?\s*)3\S*", rf"\g<1>{margin}", text))
+        assert f"{margin}" in next(line for line in out.read_text().splitlines() if "MARGIN_DEG" in line)
+        assert acu_daemon("onboard", "check", out).code == code
 
 
 def test_a_rate_limit_that_cannot_be_met_says_what_it_needs_and_that_suffices(tmp_path: Path) -> None:

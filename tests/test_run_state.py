@@ -45,6 +45,13 @@ def test_p10_what_is_read_is_what_was_written(tmp_path: Path) -> None:
     assert not stat.S_IMODE(path.stat().st_mode) & stat.S_IWOTH
 
 
+@pytest.mark.parametrize("is_held", [False, True])
+def test_with_other_elements_a_persons_hold_goes_on_and_the_nudge_does_not(is_held: bool) -> None:
+    left = replace(STATE, by_hand=replace(BY_HAND, is_held=is_held))
+    assert left.by_hand_with("TLE") == left.by_hand
+    assert left.by_hand_with("newer") == replace(left.by_hand, nudge=None)
+
+
 def test_no_file_is_no_complaint(tmp_path: Path) -> None:
     with capture_logs() as logs:
         assert read_run_state(tmp_path) == RunState()
