@@ -2,15 +2,13 @@
 
 import json
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import made_oems
 import numpy as np
 import pytest
-from command_line import acu_daemon
+from command_line import Done, acu_daemon
 from made_aems import kvn, quaternions
 from made_element_sets import omm_text
 from onboard_tasks import made_scenario, made_task
@@ -42,9 +40,8 @@ EXAMPLE = Path(__file__).resolve().parents[1] / "config" / "onboard"
 FILE_DEG = 1e-6
 
 
-def onboard(*arguments: str | Path) -> "subprocess.CompletedProcess[str]":
-    command = [sys.executable, "-m", "acu_daemon", "onboard", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+def onboard(*arguments: str | Path) -> Done:
+    return acu_daemon("onboard", *arguments)
 
 
 def pass_file(folder: Path, *changes: tuple[str, str]) -> Path:
@@ -83,19 +80,19 @@ def test_the_example_pass_becomes_a_file_that_reads_back_the_same_and_holds_the_
 def test_the_command_writes_draws_and_checks(tmp_path: Path) -> None:
     path, out, picture = pass_file(tmp_path), tmp_path / "pass.tpf", tmp_path / "pass.png"
     made = onboard("profile", path, "--out", out, "--plot", picture)
-    assert made.returncode == 0, made.stderr
+    assert made.code == 0, made.err
     assert picture.stat().st_size > 50_000
     checked = onboard("check", out)
-    assert checked.returncode == 0, checked.stderr + checked.stdout
-    assert "certificate's bounds" in checked.stdout
+    assert checked.code == 0, checked.err + checked.out
+    assert "certificate's bounds" in checked.out
     lines = out.read_text().splitlines()
     k = next(k for k, line in enumerate(lines) if line.startswith("AZ "))
     fields = lines[k].split()
     fields[4] = f"{float(fields[4]) + 0.01:+.9e}"
     out.write_text("\n".join([*lines[:k], " ".join(fields), *lines[k + 1 :]]))
     wrong = onboard("check", out)
-    assert wrong.returncode == 1
-    assert "azimuth joints" in wrong.stderr
+    assert wrong.code == 1
+    assert "azimuth joints" in wrong.err
 
 
 def test_a_file_is_checked_against_the_margin_that_it_was_made_with(tmp_path: Path) -> None:
@@ -121,7 +118,7 @@ def test_a_rate_limit_that_cannot_be_met_says_what_it_needs_and_that_suffices(tm
     planned = load_pass(path)
     made = make(planned.task(float(found[1])), planned.station, "free", "peak", planned.file.antenna.play)
     assert made.is_met
-    assert onboard("profile", path).returncode == 1
+    assert onboard("profile", path).code == 1
 
 
 def test_in_the_middle_of_a_target_the_body_points_at_it() -> None:
@@ -246,9 +243,9 @@ def test_the_beam_of_an_offset_boresight_is_put_on_the_target() -> None:
 def test_a_free_profile_that_backlash_spoils_is_not_sent_to_the_free_method(tmp_path: Path) -> None:
     change = ("azimuth_deg = 0.01\nelevation_deg = 0.01", "azimuth_deg = 1.0\nelevation_deg = 1.0")
     failed = onboard("profile", pass_file(tmp_path, change), "--out", tmp_path / "a.tpf")
-    assert failed.returncode == 1
-    assert "FAIL elevation acceleration" in failed.stdout
-    assert failed.stderr.endswith("no file is written: change [antenna] in the pass' file\n")
+    assert failed.code == 1
+    assert "FAIL elevation acceleration" in failed.out
+    assert failed.err.endswith("no file is written: change [antenna] in the pass' file\n")
     assert not (tmp_path / "a.tpf").exists()
 
 
@@ -286,8 +283,8 @@ def test_an_attitude_file_gives_the_profile_of_the_plan_it_was_made_from(tmp_pat
     at = next(k for k, line in enumerate(holes) if "T04:29:20" in line)
     (tmp_path / "a.aem").write_text("\n".join(holes[:at] + holes[at + 8 :]))
     refused = onboard("profile", path)
-    assert refused.returncode == 2
-    assert "a gap of 9.0 s in the attitude" in refused.stderr
+    assert refused.code == 2
+    assert "a gap of 9.0 s in the attitude" in refused.err
 
 
 @pytest.mark.parametrize(
@@ -350,8 +347,8 @@ def test_a_file_that_is_cut_or_changed_is_refused_with_its_line(change: tuple[st
 def test_scenarios_are_the_same_whatever_the_count_and_written_as_rows(tmp_path: Path) -> None:
     rows = tmp_path / "rows.json"
     done = onboard("scenarios", "--count", "2", "--seed", "6", "--margin-deg", "2", "--jobs", "1", "--json", rows)
-    assert done.returncode == 0, done.stderr
-    assert "samples beyond the margin (20 Hz, all methods): 0" in done.stdout
+    assert done.code == 0, done.err
+    assert "samples beyond the margin (20 Hz, all methods): 0" in done.out
     written = json.loads(rows.read_text())
     assert written["margin_deg"] == 2.0
     keys = [
