@@ -195,6 +195,12 @@ def test_a_recording_that_says_it_is_of_another_satellite_is_told_as_that(
     assert done.code == 1
     assert "probably not this satellite" in done.err
     assert "in.csv is of NOAA-20 over" in done.err
+    (tmp_path / "in.csv.json").unlink()
+    elsewhere = replace(mine.station, name="ELSEWHERE", longitude_deg=mine.station.longitude_deg + 1.0)
+    save_whose(readings, replace(mine, station=elsewhere), "2018-12-25T01:40:00Z")
+    done = replay(config, readings, tmp_path / "out.csv")
+    assert done.code == 1
+    assert "in.csv is of SENTINEL-3A over ELSEWHERE" in done.err
     (tmp_path / "in.csv.json").write_text("{")
     done = replay(config, readings, tmp_path / "out.csv")
     assert done.code == 0

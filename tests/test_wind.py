@@ -3,9 +3,13 @@
 from dataclasses import replace
 from itertools import product
 from math import inf
+from pathlib import Path
 
 import pytest
 
+from acu_daemon.cli.station_wind import StationWind
+from acu_daemon.config.station_day_tables import WindSection
+from acu_daemon.control.tick_input import StowBy
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.schedule.wind import Wind, WindRules, WindSample, WindWatch, watch
 
@@ -125,3 +129,18 @@ def test_a_wind_that_is_not_watched_says_nothing() -> None:
     assert WindWatch(newest=WindSample(1.0, 2.0, NOW)).words == ""
     assert WindWatch(Wind.STALE).words == "wind stale"
     assert WindWatch(Wind.CALM, newest=WindSample(8.26, 12.94, NOW)).words == "wind calm, mean 8.3 m/s, gusts 12.9 m/s"
+
+
+@pytest.mark.parametrize("wind", sorted(Wind))
+@pytest.mark.parametrize("stow_by", sorted(StowBy))
+@pytest.mark.parametrize("wants_stow", [False, True])
+async def test_a_person_may_end_every_stow_but_that_of_a_wind_that_is_known_to_be_strong(
+    tmp_path: Path, wind: Wind, stow_by: StowBy, wants_stow: bool
+) -> None:
+    async def beside(*_: object) -> object:
+        raise AssertionError("nothing is read here")
+
+    watched = StationWind(WindSection(), tmp_path, beside)
+    watched.seen = WindWatch(wind, wants_stow=wants_stow)
+    is_refused = wind is Wind.STRONG and stow_by is StowBy.WIND and wants_stow
+    assert bool(watched.why_not_unstow(stow_by)) == is_refused
