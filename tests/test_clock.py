@@ -1,6 +1,9 @@
 """The real clock: rehearsals, the timerfd, how UTC is followed.  That nothing is early is asserted; lateness is not."""
 
 import asyncio
+import contextlib
+import os
+import resource
 import time
 from pathlib import Path
 
@@ -135,6 +138,33 @@ async def test_the_timer_wakes_in_order_and_never_early() -> None:
         await timer.sleep_until(due)
         assert time.monotonic() >= due
     timer.close()
+
+
+def all_descriptors() -> list[int]:
+    """Take every descriptor that is left."""
+    taken = []
+    with contextlib.suppress(OSError):
+        while True:
+            taken.append(os.dup(0))
+    return taken
+
+
+@pytest.mark.parametrize(("left_count", "has_timer"), [(0, False), (1, False), (2, True)])
+async def test_the_timer_leaves_the_last_descriptor_to_the_link(left_count: int, has_timer: bool) -> None:
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (256, limits[1]))
+    taken, clock = all_descriptors(), SystemClock(THEN)
+    try:
+        for _ in range(left_count):
+            os.close(taken.pop())
+        await clock.sleep_until(THEN + 0.02)
+        taken += (left := all_descriptors())
+        assert len(left) == left_count - has_timer
+    finally:
+        for one in taken:
+            os.close(one)
+        resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+        clock.close()
 
 
 async def test_the_clock_never_wakes_before_its_tai() -> None:

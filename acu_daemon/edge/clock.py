@@ -59,6 +59,11 @@ class Timerfd:
         self._fd = _LIBC.timerfd_create(time.CLOCK_MONOTONIC, _NONBLOCK_CLOEXEC)
         if self._fd < 0:
             raise OSError(ctypes.get_errno(), "timerfd_create failed")
+        try:
+            os.close(os.dup(self._fd))
+        except OSError:  # it took the last descriptor, which is the link's
+            os.close(self._fd)
+            raise
         self._loop: asyncio.AbstractEventLoop | None = None
         self._woken: asyncio.Future[None] | None = None
 
