@@ -20,7 +20,7 @@ from acu_daemon.control.tracking.lag import LagEstimate
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.daemon.snapshot import Snapshot, StationFacts, Subject
 from acu_daemon.daemon.taking import take_snapshot
-from acu_daemon.daemon.tally import REJECTIONS, RunFigures, Tally
+from acu_daemon.daemon.tally import REJECTIONS, TRAVEL_STEP_DEG, RunFigures, Tally
 from acu_daemon.model import AxisLimits, Correction, FitResult, Model, Pass, Prediction, Reading
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.outlets.metric_families import LINK_ERRORS, Surroundings
@@ -159,6 +159,15 @@ def test_the_way_of_an_azimuth_is_counted_over_north_and_to_both_sides(
         tally.see(replace(SEEN, az_deg=(sign * az_deg) % 360.0, el_deg=40.0 + 0.01 * az_deg), RunFigures())
     assert tally.travel_deg["azimuth"] == pytest.approx(20.0)
     assert tally.travel_deg["elevation"] == pytest.approx(0.01 * abs(to_deg - from_deg))
+
+
+@pytest.mark.parametrize("step_deg", [0.03, -0.03, 0.2, -0.2])
+def test_a_way_is_counted_however_slow_the_axis_is(step_deg: float) -> None:
+    tally = Tally()
+    for k in range(101):
+        tally.see(replace(SEEN, az_deg=(1.0 + step_deg * k) % 360.0, el_deg=40.0 + step_deg * k), RunFigures())
+    for axis in ("azimuth", "elevation"):
+        assert tally.travel_deg[axis] == pytest.approx(100.0 * abs(step_deg), abs=TRAVEL_STEP_DEG)
 
 
 # What a snapshot is made of

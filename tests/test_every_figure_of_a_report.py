@@ -75,6 +75,16 @@ def figures() -> dict[str, Any]:
     return made | {"station": None}
 
 
+def test_what_was_acquired_before_the_rise_is_no_part_of_the_share_of_the_pass() -> None:
+    job = make_job(TARGET, COMING, SimpleNamespace(byte_time_s=0.0), is_rehearsal=True)  # type: ignore[arg-type]
+    watch = watched()
+    early = [replace(one, has_signal=True, is_acquired=True) for one in watch.readings[:8]]
+    watch = replace(watch, readings=[*early, *watch.readings[8:]])
+    outcome = pass_figures(job, TARGET.station, TARGET.satellite, watch, is_whole=True)["outcome"]
+    assert outcome["acquired_share"] == figures()["outcome"]["acquired_share"]
+    assert outcome["first_acquired_utc"] == at(-1.0)
+
+
 def at(seconds: float) -> str:
     return utc_text(RISE + seconds, 1)
 

@@ -128,6 +128,15 @@ def test_the_filter_learns_the_drag_and_keeps_it_through_a_manoeuvre() -> None:
     assert seen.state[0] == pytest.approx(d_m[-2], abs=15.0)
 
 
+def test_a_manoeuvre_moves_the_drift_and_makes_it_as_unsure_as_the_manoeuvre_is() -> None:
+    seen = DriftFilter(Forecast(3600.0, np.zeros(9), np.zeros(9)))
+    before = seen.covariance.copy()
+    seen.push(-0.25, 0.002)
+    assert seen.state.tolist() == [0.0, -0.25, 0.0]
+    before[1, 1] += 0.002**2
+    assert seen.covariance == pytest.approx(before, rel=1e-12)
+
+
 def test_the_papers_controller_waits_for_its_windows_and_aims_at_the_lower_limit() -> None:
     acceleration = 40.0 / DAY_S**2
     settings = PaperSettings(100.0, -100.0, 8.0 * 3600.0, 20.0 * 3600.0)

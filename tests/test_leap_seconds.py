@@ -46,6 +46,12 @@ def test_a_list_with_one_more_leap_second_is_newer() -> None:
     assert found.dates[-1] == date(2029, 7, 1)
 
 
+def test_a_word_of_the_hash_that_begins_with_a_zero_may_lack_it() -> None:
+    texts = (a_list(expires=EXPIRES + days * 86400) for days in range(100))
+    text = next(text for text in texts if min(map(len, text.split("#h\t")[1].split())) < 8)
+    assert parse_leap_seconds(text, "leap-seconds.list").dates == LEAP_DATES
+
+
 @pytest.fixture
 def _built_in_afterwards() -> Iterator[None]:
     yield

@@ -112,6 +112,7 @@ def test_a_hold_after_a_failed_search_looks_worse_than_one_on_the_fit() -> None:
     assert verdict(HOLDING).level is Level.CALM
     assert verdict(replace(HOLDING, state="HOLD/TLE", path="elements")).level is Level.WATCH
     assert verdict(replace(HOLDING, inside_s=0.0)).level is Level.WATCH
+    assert verdict(replace(HOLDING, inside_s=None)).level is Level.CALM  # of an estimator without a sigma
 
 
 @pytest.mark.parametrize("state", list(TrackState))

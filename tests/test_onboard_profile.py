@@ -16,6 +16,7 @@ from onboard_tasks import made_scenario, made_task
 from acu_daemon.edge.onboard_files import load_pass
 from acu_daemon.errors import ProfileError, UsageError
 from acu_daemon.model import AxisLimits, Station
+from acu_daemon.onboard import relief
 from acu_daemon.onboard.bound import least_rate
 from acu_daemon.onboard.branches import AZIMUTH_GUARD
 from acu_daemon.onboard.checks import Backlash, check_profile
@@ -26,10 +27,10 @@ from acu_daemon.onboard.gimbal_frames import angles_between_deg, beam_direction,
 from acu_daemon.onboard.ground import footprint_east_north_m, track_east_north_m
 from acu_daemon.onboard.parameter_file import read, write
 from acu_daemon.onboard.pipeline import make
-from acu_daemon.onboard.profile import off_pointing, peak_rate_deg_s
+from acu_daemon.onboard.profile import RATE_GUARD, off_pointing, peak_rate_deg_s
 from acu_daemon.onboard.quintic import Knots
 from acu_daemon.onboard.recheck import check_certificate, check_peaks
-from acu_daemon.onboard.relief import least_interruption, least_margin_deg
+from acu_daemon.onboard.relief import bound_at, least_interruption, least_margin_deg
 from acu_daemon.onboard.scenarios import DAEJEON
 from acu_daemon.orbit.frames import station_itrs_m, teme_from_itrs
 from acu_daemon.orbit.tle import parse_tle
@@ -206,6 +207,8 @@ def test_the_least_margin_lets_a_free_path_keep_to_the_rate() -> None:
     task = made_task(3, 1.0)
     margin_deg = least_margin_deg(task, 0.45)
     assert margin_deg is not None
+    wanted = 0.45 * RATE_GUARD / relief._SPARE
+    assert bound_at(task, AZIMUTH_GUARD * margin_deg) <= wanted < bound_at(task, AZIMUTH_GUARD * (margin_deg - 0.01))
     wider = replace(task, cone=Cone(margin_deg), azimuth=AxisLimits(-270.0, 270.0, 0.45, np.inf))
     assert free_profile(wider) is not None
     assert free_profile(replace(wider, cone=Cone(0.97 * margin_deg))) is None
