@@ -453,8 +453,9 @@ def test_a_turn_is_learned_where_the_antenna_follows_on_it(side: int) -> None:
     fields = {"az_deg": -155.0 + side * (1.0 - STEP), "by": "the antenna follows on it"}
     assert (problem, events) == ("", [Event("turn.learned", fields)])
     assert after.turn == TurnWatch(learned_count=3)
-    not_yet = moving(side * (1.0 + STEP))
-    assert watch(not_yet) == (not_yet, "", [])
+    for off_deg in (1.0, 1.0 + STEP):
+        not_yet = moving(side * off_deg)
+        assert watch(not_yet) == (not_yet, "", [])
     for how in (
         {"stage": StartStage.PRESENT_WRITTEN},
         {"seen": status(AcuMode.STANDBY)},
