@@ -12,6 +12,7 @@ from acu_daemon.acu.commands import AcuMode, Backup, Identify, ReadFaults
 from acu_daemon.acu.replies import AcuStatus, Commanded, FaultReport, Refused, Reply
 from acu_daemon.control.control_config import ControlConfig
 from acu_daemon.control.safety.foreign_stop import (
+    ANOTHER_HAND,
     STOPPED_FROM,
     forget_held,
     note_held,
@@ -94,6 +95,10 @@ def test_no_stop_is_taken_of_an_antenna_that_is_not_held_or_not_the_daemons_to_m
     assert found()[1]
     state = held(STANDBY, **changes)
     assert watch_for_stop(held(HOLDING), state, config) == (state, False)
+
+
+def test_people_are_told_who_it_was() -> None:
+    assert ANOTHER_HAND == "another hand that stopped the antenna"
 
 
 def test_a_status_is_judged_once() -> None:
