@@ -9,6 +9,7 @@ import pytest
 from made_orbits import EPOCH_TAI_S, circular, site
 
 from acu_daemon.assist.mount_model import encoder_look
+from acu_daemon.assist.session.prediction import predict
 from acu_daemon.control.tick_input import PassPlan
 from acu_daemon.control.tracking.expected_way import MOST_STEPS, ExpectedWay, expected_way
 from acu_daemon.model import AxisLimits, sky_angle_deg
@@ -162,6 +163,13 @@ def test_past_the_zenith_the_azimuth_turns_the_way_of_the_plan(zenith_turn: int)
 def test_over_the_top_the_elevation_that_is_followed_goes_beyond_the_zenith() -> None:
     rules = KeyholeRules(AZIMUTH, max_el_deg=180.0, may_plunge=True)
     found = way(station=OVERHEAD, rules=rules, elevation=(0.0, 180.0))
+    buffer = predict(
+        *(ORBIT, OVERHEAD, T + FROM_S, T + FROM_S, "TLE", seen_at(FROM_S, OVERHEAD)[0]),
+        horizon_s=TO_S - FROM_S,
+        keyhole=rules,
+    )
+    assert np.array_equal(found.antenna_el_deg, buffer.follow_el_deg)
+    assert np.abs(found.antenna_el_deg - found.path_el_deg).max() > 1e-3
     assert found.antenna_el_deg[-1] > 90.0
     assert found.off_deg[-1] < 1e-3
     assert way(station=OVERHEAD, rules=rules).antenna_el_deg.max() == 90.0

@@ -108,6 +108,7 @@ CHANGES: dict[str, tuple[ControlState, Sky, TrackState, Cause]] = {
     "fit left": (going(S.HOLD_FITTED, BACKED_UP), SKY, S.HOLD_TLE, Cause.FIT_LEFT),
     "acquired": (going(S.HOLD_TLE, status()), SKY, S.AUTOTRACK_TLE, Cause.ACQUIRED),
     "over": (going(S.HOLD_TLE, BACKED_UP, hold_from_tai_s=NOW - 9e3), SKY, S.SEARCH, Cause.HOLD_OVER),
+    "never heard": (going(S.ACQUIRE_TLE, BACKED_UP, entered_tai_s=NOW - 90.0), SKY, S.SEARCH, Cause.ACQUIRE_OVER),
     "searched": (going(S.SEARCH, BACKED_UP, entered_tai_s=NOW - 9e3), SKY, S.HOLD_TLE, Cause.SEARCH_OVER),
     "fault": (going(S.HOLD_TLE, status(AcuMode.FAULT)), SKY, S.FAULT, Cause.ACU_FAULT),
     "panel": (going(S.HOLD_TLE, status(AcuMode.MANUAL)), SKY, S.MANUAL, Cause.LOCAL_PANEL),
@@ -141,12 +142,12 @@ def test_behind_a_hill_it_is_told_when_the_satellite_comes_out(
     track: TrackState, is_fitted: bool, target: TrackState, cause: Cause, along_s: float
 ) -> None:
     fit = FitResult("full", Correction(), NOW, 9, 0, 0.0, along_s, 0.0)
-    plan = replace(RISING, hidden_tai_s=((NOW - 5.0, NOW + 20.04),))
+    plan = replace(RISING, hidden_tai_s=((NOW - 5.0, NOW + 20.26),))
     sky = Sky(path("FITTED" if is_fitted else "TLE"), fit, plan)
     seen = status(AcuMode.ACQUIRE)
     after, events = step(going(track, seen), sky, HILLY)
     fields = {"state": str(target), "before": str(track), "cause": str(cause)}
-    assert events == [Event("state.changed", fields | {"back_in_s": round(20.0 + along_s, 1)})]
+    assert events == [Event("state.changed", fields | {"back_in_s": round(20.3 + along_s, 1)})]
     assert (after.tracking.track, after.tracking.hold_from_tai_s) == (target, NOW)
     for plan_without in (RISING, replace(RISING, hidden_tai_s=((NOW - 9.0, NOW - 8.0),))):
         assert step(going(track, seen), replace(sky, plan=plan_without), HILLY)[1][0].fields == fields
