@@ -22,7 +22,7 @@ from acu_daemon.units import DEG
 JOB = make_job(TARGET, COMING, type("Line", (), {"byte_time_s": 0.0})(), is_rehearsal=True)
 FIT = FitResult("full", Correction(), RISE, 9, 0, 0.01, 0.0, 0.0)
 
-ALONG_DEG = 1e-3  # a look along a path and one by one differ by less
+ALONG_DEG = 0.005  # what is interpolated between readings 5 s apart differs by less
 
 # Residuals
 
