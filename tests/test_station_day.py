@@ -505,8 +505,13 @@ def interrupted(desk: Desk) -> float:
 
 
 @pytest.mark.parametrize("side", [-1, 1])
-def test_a_pass_is_given_up_the_longest_way_before_the_other_and_says_so(desk: Desk, side: int) -> None:
+@pytest.mark.parametrize("tilt", ["", TILT])
+def test_a_pass_is_given_up_the_longest_way_before_the_other_and_says_so(
+    made: Callable[..., Desk], tilt: str, side: int
+) -> None:
+    desk = made(STATION + tilt + TABLES)
     way_s = interrupted(desk)
+    assert (way_s > 300.0) == bool(tilt)
     found = desk.day.interrupter(NOW + 1200.0 - way_s + side * STEP_S)
     assert found == (INTERRUPTER if side > 0 else None)
     assert desk.day.course._tracked.words == [f"given up for {INTERRUPTER.name}"] * (side > 0)
