@@ -112,7 +112,9 @@ def test_the_page_shows_the_newest_first_with_each_figure_under_its_head() -> No
     ]
 
 
-@pytest.mark.parametrize(("hours", "ends"), [((3, 7, 12), ["3", "12"]), ((12, 7), ["7", "12"]), ((5,), ["5", "5"])])
+@pytest.mark.parametrize(
+    ("hours", "ends"), [((3, 7, 12), ["3", "12"]), ((12, 7), ["7", "12"]), ((5,), ["5", "5"]), ((0, 7), ["0", "7"])]
+)
 def test_what_drifts_is_told_from_the_first_to_the_last_that_are_known(hours: tuple[int, ...], ends: list[str]) -> None:
     rows = rows_of(index_page(index_of(*hours)))
     [along] = [row for row in rows if row[0] == "correction along the track, s"]
