@@ -239,6 +239,16 @@ def test_a_set_of_which_no_pass_is_counts_only_where_it_is_the_first(monkeypatch
     assert Sky(monkeypatch, [0.0], []).by_epoch(0.0) == [(0.0, [])]
 
 
+def test_a_newer_set_of_which_no_pass_is_is_passed_over_on_the_way_to_the_nearest(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    sky = Sky(monkeypatch, [0.0, 50_000.0, 90_000.0], [1000.0, 80_000.0])
+    given = iter([50_000.0, 90_000.0])
+    monkeypatch.setattr(coming_passes, "load_target", lambda *_, **__: sky.target(START + next(given)))
+    assert sky.by_epoch(0.0) == [(0.0, [1000.0]), (90_000.0, [80_000.0])]
+    assert [from_s for _, from_s, *_ in sky.searched] == [0.0, 1601.0, 1601.0]
+
+
 def test_what_rose_before_the_search_counts_as_at_its_start(monkeypatch: pytest.MonkeyPatch) -> None:
     sky = Sky(monkeypatch, [-900.0, 500.0], [-300.0])
     assert sky.by_epoch(-900.0) == [(-900.0, []), (500.0, [-300.0])]
