@@ -85,6 +85,7 @@ def test_the_window_ends_at_the_kinks_found_already(others: list[int], is_one: b
 @pytest.mark.parametrize(("far_days", "counts"), [(WINDOW_DAYS - 0.5, True), (WINDOW_DAYS + 0.51, False)])
 @pytest.mark.parametrize("side", [-1, 1])
 def test_the_points_within_eight_days_on_either_side_count(side: int, far_days: float, counts: bool) -> None:
+    assert WINDOW_DAYS == 8.0
     d_m = kinked(DAYS, (19.5, 100.0))
     d_m[round(19.5 + side * far_days)] += 50.0
     kink = _kink_at(DAYS, d_m, 19, [], 1.0)
