@@ -81,7 +81,7 @@ def test_a_latch_comes_first_then_a_disarm_then_the_rest_in_order(places: Places
     said = places.found().detail.split("; ")
     assert said[1:] == ["latched: azimuth", "disarmed by ann", *ALARM_KEYS]
     assert [text.partition("_")[0] for text in ALARM_KEYS] == [
-        *("clock", "encoder", "files", "turn", "limit", "line", "stow", "tilt")
+        *("acu", "clock", "encoder", "envelope", "files", "turn", "limit", "line", "signal", "stow", "tilt")
     ]
 
 

@@ -8,9 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from acu_daemon.cli.check_finding import GO, NO_GO, WARN, Finding
-from acu_daemon.cli.options import (
-    antenna_of,
-)
+from acu_daemon.cli.options import antenna_of
 from acu_daemon.cli.own_daemon import OwnDaemon
 from acu_daemon.config.load import load_station
 from acu_daemon.config.station_tables import StationFile
@@ -22,8 +20,8 @@ from acu_daemon.errors import UsageError
 
 HEALTHY_AGE_S = 5.0
 ALARM_KEYS = (  # of a snapshot
-    *("clock_alarm", "encoder_problem", "files_alarm", "turn_alarm"),
-    *("limit_alarm", "line_alarm", "stow_alarm", "tilt_alarm"),
+    *("acu_faults", "clock_alarm", "encoder_problem", "envelope_alarm", "files_alarm", "turn_alarm"),
+    *("limit_alarm", "line_alarm", "signal_alarm", "stow_alarm", "tilt_alarm"),
 )
 
 
