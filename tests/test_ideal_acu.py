@@ -102,7 +102,7 @@ def test_registers_are_followed_in_remote_alone_with_the_rate_of_their_writes_as
     for mode in AcuMode:
         made, az, el = acu(mode=mode), AxisState(100.0), AxisState(40.0)
         before = (100.0, 40.0)
-        for goal in ((101.0, 39.5), (103.0, 38.0), (103.25, 38.0), (140.0, 10.0)):
+        for goal in ((100.05, 39.98), (100.1, 39.96), (101.0, 39.5), (103.0, 38.0), (103.25, 38.0), (140.0, 10.0)):
             answer = made.answer(PointAndPoll(*goal) if is_polled else PointAt(*goal))
             assert answer == (made.status if is_polled else Done())
             held = made.answer(ReadCommanded())

@@ -5,6 +5,7 @@ say is told by a small judge; what orbits say of real readings is in test_track_
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -80,7 +81,7 @@ class Uncorrelated:
 class Gate(TrackGate):
     def __init__(self, kept: Readings | None = None, waiting: Readings | None = None, **fields: Any) -> None:
         super().__init__(SOURCE, WHERE, SETTINGS)
-        self.orbits = Orbits()
+        self.orbits, self.covariances = Orbits(), []
         self._orbit_test = self.orbits  # type: ignore[assignment]
         self._correlated = Uncorrelated()  # type: ignore[assignment]
         self.kept = kept or self.kept
@@ -89,6 +90,7 @@ class Gate(TrackGate):
             setattr(self, name, value)
 
     def _offsets(self, readings: Readings, fit: FitResult | None) -> Offsets:
+        self.covariances.append(fit.covariance if fit else None)
         return beside(readings)
 
     @property
@@ -266,12 +268,21 @@ def test_a_young_track_is_taken_back_whole_and_the_next_must_be_an_orbits_for_lo
     assert [one for one, _ in gate.orbits.asked][:1] == ([17] if not is_young else [None] if trial_s < 20.0 else [])
 
 
-def test_what_leaves_upwards_jumps_too() -> None:
-    gate = Gate(row(0.0, 40))
+@pytest.mark.parametrize("beamwidth_deg", [1.0, 2.0])
+@pytest.mark.parametrize(("share", "is_jump"), [(0.98, False), (1.02, True)])
+def test_a_jump_is_half_a_beam_in_any_direction_from_the_last_reading_on_the_path(
+    beamwidth_deg: float, share: float, is_jump: bool
+) -> None:
+    right_deg, up_deg = share * 0.3 * beamwidth_deg, share * 0.4 * beamwidth_deg
+    kept = row(0.0, 40)
+    gate = Gate(
+        Readings(kept.tai_s, np.full(40, 0.1), np.full(40, -0.1)),
+        _settings=replace(SETTINGS, beamwidth_deg=beamwidth_deg),
+    )
     tai_s = 40.0 + np.array([0.0, 0.5, 1.0])
-    off = Readings(tai_s, np.full(3, 0.4), np.full(3, 0.4))
-    assert times(gate.take(off, FIT)) == []
-    assert len(gate.kept) == 40
+    off = Readings(tai_s, np.full(3, 0.1 + right_deg), np.full(3, -0.1 + up_deg))
+    gate.take(off, FIT)
+    assert (len(gate.kept) == 40) is is_jump
 
 
 def test_off_readings_that_an_orbit_near_the_elements_takes_in_are_kept_after_all() -> None:
@@ -303,7 +314,8 @@ def reset(
     gate = Gate(kept, waiting, _is_clear=True, **fields)
     gate.orbits.alone = lambda one: beside(Readings(one.tai_s, np.zeros(len(one)), one.el_deg))
     gate.orbits.strains = list(strains)
-    gate.take(row(from_s + waited_s, 1, LOBE_DEG, None if rise is None else 6.0 + rise), FIT)
+    taken = gate.take(row(from_s + waited_s, 1, LOBE_DEG, None if rise is None else 6.0 + rise), FIT)
+    assert (taken is None) is (gate.reset_count == 1)
     return gate
 
 
@@ -362,8 +374,8 @@ def test_strain_is_judged_by_the_newest_of_both() -> None:
 class Correlated(Uncorrelated):
     """All that is near is asked about, and is correlated since then."""
 
-    def __init__(self, begin_tai_s: float) -> None:
-        self.begin_tai_s = begin_tai_s
+    def __init__(self, begin_tai_s: float, *, are_they: bool = True) -> None:
+        self.begin_tai_s, self.are_they = begin_tai_s, are_they
         self.taken = 0
 
     def is_within(self, seen: Offsets) -> Array:
@@ -373,7 +385,7 @@ class Correlated(Uncorrelated):
         self.taken += len(readings)
 
     def are_correlated(self, kept: Readings, offsets_of: Callable[[Readings], Offsets]) -> bool:
-        return len(offsets_of(kept).tai_s) > 0
+        return self.are_they and len(offsets_of(kept).tai_s) == len(kept)
 
 
 @pytest.mark.parametrize(("begin_s", "kept_count"), [(25.0, 25), (24.5, 25), (29.0, 29), (29.5, 30)])
@@ -399,3 +411,13 @@ def test_with_what_is_correlated_those_farther_off_wait() -> None:
     taken = gate.take(Readings.joined([row(30.0, 1, NEAR_DEG), row(31.0, 2, LOBE_DEG)]), FIT)
     assert (times(taken), times(gate.waiting), len(gate.kept)) == ([], [31.0, 32.0], 30)
     assert gate.counts == {CORRELATED: 1, SIDE_LOBE: 2}
+
+
+def test_what_is_asked_about_and_is_not_correlated_is_kept_and_the_question_needs_no_sigma() -> None:
+    gate = Gate(row(0.0, 30), _correlated=Correlated(25.0, are_they=False))
+    assert times(gate.take(row(30.0, 2, NEAR_DEG), FIT)) == [30.0, 31.0]
+    assert (len(gate.kept), gate.counts) == (32, {})
+    asked = Gate(row(0.0, 30), _correlated=Correlated(99.0))
+    covariance = np.eye(2)
+    asked.take(row(30.0, 2, NEAR_DEG), replace(FIT, covariance=covariance))
+    assert [one is covariance for one in asked.covariances] == [True, False]
