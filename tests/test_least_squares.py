@@ -174,6 +174,15 @@ def test_the_stations_shift_has_partials_where_it_is_in_question(sigma_m: float,
     assert steps.shifts == [sigma_m > 0.0]
 
 
+def test_readings_are_compared_from_where_the_states_put_the_station(monkeypatch) -> None:
+    Steps(monkeypatch, [0.0])
+    x = np.zeros(STATE_COUNT)
+    x[10:13] = 5000.0, -3000.0, 100.0
+    given, moved = sweeps()[0].left.off_rad, sweeps(x)[0].left.off_rad
+    assert np.abs(given).max() < 1e-5
+    assert np.abs(moved).min(axis=1).max() > 1e-4
+
+
 # Noise that goes on
 
 

@@ -193,4 +193,5 @@ def test_where_the_buffer_does_not_reach_the_path_beside_is_as_predicted_and_bef
     assert steered(nudge=far) == path_point(SKY, T)
     assert steered(Sky(path(), None, STARTING), NOW, nudge=far) is None
     turned = Sky(replace(path(), follow_az_deg=path().az_deg + DOWN_TO_EARTH), None, PLAN)
-    assert steered(turned, follow=True, nudge=far) == path_point(turned, T, follow=True)
+    for follow in (False, True):
+        assert steered(turned, follow=follow, nudge=far) == path_point(turned, T, follow=follow)

@@ -159,6 +159,12 @@ def test_what_has_waited_for_too_long_is_left_out_with_its_reason(age_s: float, 
     assert gate.counts == {SIDE_LOBE: 2}
 
 
+def test_what_has_waited_is_as_old_as_the_newest_reading_says() -> None:
+    gate = Gate(row(-300.0, 3), row(0.0, 1, LOBE_DEG), _waiting_reason=SIDE_LOBE, _is_clear=True)
+    gate.take(row(limits.WAITING_S - 0.5, 2, LOBE_DEG), FIT)
+    assert times(gate.waiting) == [limits.WAITING_S - 0.5, limits.WAITING_S + 0.5]
+
+
 def test_a_restart_believes_only_the_newest() -> None:
     gate = Gate(row(0.0, 10))
     gate.restart(4.0)
@@ -280,7 +286,7 @@ def test_a_jump_is_half_a_beam_in_any_direction_from_the_last_reading_on_the_pat
         _settings=replace(SETTINGS, beamwidth_deg=beamwidth_deg),
     )
     tai_s = 40.0 + np.array([0.0, 0.5, 1.0])
-    off = Readings(tai_s, np.full(3, 0.1 + right_deg), np.full(3, -0.1 + up_deg))
+    off = Readings(tai_s, np.full(3, 0.1 + right_deg), -0.1 + up_deg * np.array([1.0, 1.2, 1.4]))
     gate.take(off, FIT)
     assert (len(gate.kept) == 40) is is_jump
 
