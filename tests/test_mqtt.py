@@ -343,6 +343,9 @@ def test_of_the_log_of_an_hour_the_newest_lines_are_told_oldest_first_and_once()
     assert told == [f"number={number}" for number in range(3600 - KEPT, 3600)]
     assert (schedule.topic, state.topic) == ("site/dish/schedule", "site/dish/state")
     assert publisher._news() == []
+    for number in (3600, 3601):
+        station.events.add({"event": "tick", "number": number, "level": "info"})
+    assert [json.loads(one.payload)["text"] for one in publisher._news()] == ["number=3600", "number=3601"]
 
 
 @needs_mosquitto
