@@ -148,3 +148,13 @@ def members(group: int) -> list[int]:
         if int(fields[2]) == group and fields[0] != "Z":
             found.append(int(path.parent.name))
     return found
+
+
+async def test_of_what_a_hook_prints_the_last_is_kept() -> None:
+    printed = asyncio.StreamReader()
+    printed.feed_data(b"good morning" + b"." * 3 * module.KEPT_BYTES + b"no such device")
+    printed.feed_eof()
+    kept = await module._read(printed)
+    assert len(kept) == module.KEPT_BYTES
+    assert kept.endswith(b"no such device")
+    assert await module._read(None) == b""

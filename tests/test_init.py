@@ -10,6 +10,7 @@ from command_line import Done, acu_daemon
 from acu_daemon.cli import init
 from acu_daemon.cli.station_files import file_word, shipped_station, station_text
 from acu_daemon.config.load import load_satellite, load_station, satellite_names
+from acu_daemon.errors import UsageError
 
 ROOT = Path(__file__).resolve().parents[1]
 DEMO = (ROOT / "acu_daemon" / "cli" / "demo_config" / "satellites" / "demo-1.tle").read_text()
@@ -169,3 +170,21 @@ def test_a_satellite_without_a_name_is_called_by_its_number(tmp_path: Path) -> N
     assert satellite_names(tmp_path / "station") == ["99901"]
     assert file_word("Amazônia 1 [+]") == "amazonia-1"
     assert file_word("NOAA 20 (JPSS-1)") == "noaa-20"
+
+
+@pytest.mark.parametrize(
+    ("word", "number"), [("noaa 1", 90001), ("NOAA-1", 90001), ("noaa18", 90018), ("aa 18", 90018), ("90001", 90001)]
+)
+def test_a_whole_name_goes_before_a_part_of_others_however_it_is_written(
+    tmp_path: Path, word: str, number: int
+) -> None:
+    path = tmp_path / "list.tle"
+    path.write_text(a_set("NOAA 1", 90001) + a_set("NOAA 18", 90018))
+    assert init._find(init._list(path), word).norad_id == number
+
+
+def test_a_part_that_several_names_have_is_asked_about(tmp_path: Path) -> None:
+    path = tmp_path / "list.tle"
+    path.write_text(a_set("NOAA 1", 90001) + a_set("NOAA 18", 90018))
+    with pytest.raises(UsageError, match="fits"):
+        init._find(init._list(path), "noaa")

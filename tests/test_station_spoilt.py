@@ -131,3 +131,14 @@ def test_a_move_that_was_put_off_after_the_horn_is_warned_of_anew() -> None:
     assert heard(-500.0) == (False, 3)  # the clock was set
     horn.forget()
     assert heard(1.0) == (False, 4)
+
+
+def test_a_warning_of_a_quarter_of_a_minute_that_is_asked_for_each_second_is_one() -> None:
+    sounded: Any = Sounded()
+    horn = Horn(sounded, sounded)
+    heard = []
+    for _ in range(17):
+        heard.append(horn.is_heard({}, 15.0, is_wanted=True))
+        sounded.now_tai_s += 1.0
+    assert heard == [False] * 15 + [True, True]
+    assert sounded.count == 1
