@@ -68,6 +68,15 @@ def test_a_present_outside_the_span_is_an_error_that_names_it(tmp_path: Path, aw
     assert "2022-02-11T20:00:00Z to 2022-02-11T22:00:00Z, which 2022-02-11T" in error
 
 
+@pytest.mark.parametrize("chosen", ["OTHER", "ISS"])
+def test_of_several_objects_the_one_that_the_file_of_the_satellite_names_is_taken(tmp_path: Path, chosen: str) -> None:
+    both = kvn(states(600.0), OBJECT_NAME="OTHER", OBJECT_ID="2020-001-A") + kvn(states())
+    text = SATELLITE.replace("[elements]\n", f'[elements]\nobject = "{chosen}"\n')
+    assert text != SATELLITE
+    loaded = load(tmp_path, both, satellite=text)
+    assert loaded.label.startswith(f"{chosen} (")
+
+
 def test_limits_hold_for_ephemerides_too(tmp_path: Path) -> None:
     narrow = SATELLITE + "[elements.limits]\nmax_inclination_deg = 40.0\n"
     [error] = load(tmp_path, kvn(states()), satellite=narrow).errors
