@@ -47,7 +47,7 @@ def test_one_over_the_top_that_autotrack_went_round_is_over_at_its_return(track:
 
 
 @pytest.mark.parametrize("has_prediction", [False, True])
-def test_without_a_prediction_nothing_is_in_hand_and_the_path_continues_on_the_turn_of_the_plan_or_the_antenna(
+def test_the_path_goes_on_from_the_plan_before_it_begins_and_without_a_buffer_else_from_the_buffer(
     has_prediction: bool,
 ) -> None:
     state = remembering(ready(TrackState.AUTOTRACK_TLE, status(AcuMode.AUTOTRACK)), az_deg=49.0)

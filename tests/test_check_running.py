@@ -2,7 +2,7 @@
 
 import json
 import os
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,8 @@ from acu_daemon.cli.own_daemon import OwnDaemon
 from acu_daemon.config.load import load_station
 from acu_daemon.control.tracking.state_table import TrackState
 from acu_daemon.daemon.health import status_line
-from acu_daemon.daemon.verdict import Level, verdict
+from acu_daemon.daemon.snapshot import Snapshot
+from acu_daemon.daemon.verdict import Level, alarms, verdict
 from acu_daemon.edge.state_directory import SNAPSHOT
 
 NOW_S = 1_000_000.0
@@ -83,6 +84,15 @@ def test_a_latch_comes_first_then_a_disarm_then_the_rest_in_order(places: Places
     assert [text.partition("_")[0] for text in ALARM_KEYS] == [
         *("acu", "clock", "encoder", "envelope", "files", "turn", "limit", "line", "signal", "stow", "tilt")
     ]
+
+
+def test_whatever_text_of_a_snapshot_is_an_alarm_elsewhere_is_one_here() -> None:
+    texts = [one.name for one in fields(Snapshot) if isinstance(getattr(SEEN, one.name), str)]
+    raised = {
+        name for name in texts if any("look at it" in said for said in alarms(replace(SEEN, **{name: "look at it"})))
+    }
+    own_words, momentary = {"latch"}, {"rejecting"}
+    assert raised == {*ALARM_KEYS} | own_words | momentary
 
 
 @pytest.mark.parametrize("text", ["[]", "{", "", '"text"', "7"])

@@ -191,8 +191,7 @@ def _first_direction(flown: Rehearsal) -> tuple[float, float]:
     seen = apparent_at(source, np.array([begin_tai_s]), station.site)
     stands_deg = _in_the_middle(float(seen.az_deg[0]), azimuth)
     plan = plan_pass(source, station.site, flown.coming, stands_deg, azimuth, begin_tai_s, elevation=elevation)
-    turn_deg = 360.0 * round((plan.start_az_deg - stands_deg) / 360.0)
-    return _held(stands_deg + turn_deg, azimuth), _held(float(seen.el_deg[0]), elevation)
+    return _held(plan.start_az_deg, azimuth), _held(plan.start_el_deg, elevation)
 
 
 def _in_the_middle(az_deg: float, limits: AxisLimits) -> float:
