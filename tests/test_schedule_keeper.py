@@ -465,3 +465,50 @@ async def test_words_and_passes_say_when_and_by_whom(desk: Desk) -> None:
         *desk.file._db.execute("select * from pauses").fetchall(),
     ]
     assert rows == [("A", NOW + 50.0, str(Wish.FORCE), NOW + 7.0, "ann"), (NOW + 60.0, NOW + 7.0, "ben")]
+
+
+# For which pass one in progress is given up
+
+RUNNING = Entry(
+    "A", 1000.0, 1300.0, 1600.0, 40.0, 5, PassState.PASS, "", start_tai_s=1000.0, end_tai_s=1600.0, number=1
+)
+COMING = Entry(
+    "B", 1200.0, 1500.0, 1800.0, 40.0, 6, PassState.PLANNED, "", start_tai_s=1210.0, end_tai_s=1800.0, number=2
+)
+LEAD_S = 30.0
+
+
+@pytest.fixture
+def keeper(desk: Desk) -> ScheduleKeeper:
+    """In mid-pass, with one coming that may interrupt."""
+    desk.now_tai_s = 1100.0
+    desk.keeper.book, desk.keeper._interrupters = (RUNNING, COMING), frozenset({"B"})
+    return desk.keeper
+
+
+@pytest.mark.parametrize(("priority", "interrupts"), [(4, False), (5, False), (6, True)])
+def test_one_of_a_higher_priority_alone_interrupts(keeper: ScheduleKeeper, priority: int, interrupts: bool) -> None:
+    keeper.book = (RUNNING, coming := replace(COMING, priority=priority))
+    assert keeper.interrupter(RUNNING, 1200.0, LEAD_S) == (coming if interrupts else None)
+
+
+def test_one_whose_file_says_nothing_of_it_does_not(keeper: ScheduleKeeper) -> None:
+    keeper._interrupters = frozenset({"A"})
+    assert keeper.interrupter(RUNNING, 1200.0, LEAD_S) is None
+
+
+@pytest.mark.parametrize(("now_tai_s", "is_due"), [(1180.0 - STEP_S, False), (1180.0, True), (1300.0, True)])
+def test_it_does_so_from_its_lead_before_its_reservation(
+    keeper: ScheduleKeeper, now_tai_s: float, is_due: bool
+) -> None:
+    assert keeper.interrupter(RUNNING, now_tai_s, LEAD_S) == (COMING if is_due else None)
+
+
+@pytest.mark.parametrize(("set_tai_s", "is_due"), [(1210.0, False), (1210.0 + STEP_S, True)])
+def test_one_that_begins_after_the_set_waits_for_it(keeper: ScheduleKeeper, set_tai_s: float, is_due: bool) -> None:
+    assert keeper.interrupter(replace(RUNNING, set_tai_s=set_tai_s), 1205.0, LEAD_S) == (COMING if is_due else None)
+
+
+def test_one_that_was_not_granted_does_not(keeper: ScheduleKeeper) -> None:
+    keeper.book = (RUNNING, replace(COMING, state=PassState.REFUSED, start_tai_s=None))
+    assert keeper.interrupter(RUNNING, 1200.0, LEAD_S) is None
