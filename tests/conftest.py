@@ -21,6 +21,7 @@ SHARED = PROJECT.parent / "shared"
 DATA = SHARED / "data"
 
 os.umask(0o022)  # whatever the caller's is: it decides who may write the files of the tests
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the daemon has it; a test that loads numpy first would not
 os.environ.setdefault("MPLCONFIGDIR", str(PROJECT / ".pytest_cache" / "matplotlib"))  # no cache in anybody's home
 
 os.environ["XDG_RUNTIME_DIR"] = tempfile.mkdtemp(prefix="acu-daemon-")  # clocks of rehearsals: of these tests alone

@@ -61,6 +61,7 @@ def dead(rig: Rig) -> None:
 OUTAGES = [cut, refused, dead]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("outage", OUTAGES)
 @pytest.mark.parametrize("what", ["stop", "standby"])
 def test_p1_a_stop_in_an_outage_is_respected_until_a_person_arms(
@@ -85,6 +86,7 @@ def test_p1_a_stop_while_the_daemon_hangs_is_respected(rig: Rig) -> None:
     assert rig.state.arming.disarmed_by == BY_HAND
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("outage", OUTAGES)
 def test_p1_a_takeover_by_the_panel_that_is_over_when_the_outage_is_counts_as_a_stop(
     rig: Rig, outage: Callable[[Rig], None]
@@ -103,6 +105,7 @@ def test_p1_an_emergency_stop_that_is_reset_within_an_outage_disarms(rig: Rig, o
     assert rig.state.arming.disarmed_by == BY_HAND
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("outage", OUTAGES)
 def test_p1_a_stow_in_an_outage_is_kept_through_another_crash(rig: Rig, outage: Callable[[Rig], None]) -> None:
     meanwhile(rig, "stow")
@@ -114,6 +117,7 @@ def test_p1_a_stow_in_an_outage_is_kept_through_another_crash(rig: Rig, outage: 
     assert rig.state.tracking.track == "STOW"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("outage", OUTAGES)
 def test_p4_after_an_outage_in_which_nobody_did_anything_it_holds_again(
     rig: Rig, outage: Callable[[Rig], None]
@@ -132,6 +136,7 @@ def trip_by_line(rig: Rig) -> None:
     rig.wait(W_TRIPS_S + 1.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("trip", [trip_by_crash, trip_by_line])
 def test_p4_after_the_register_watchdog_has_tripped_it_holds_again_within_three_seconds(
     rig: Rig, trip: Callable[[Rig], None]
@@ -153,6 +158,7 @@ def status_without_system_faults(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("acu_daemon.sim.acu.status_of", status_of)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("status_without_system_faults")
 @pytest.mark.parametrize("trip", [trip_by_crash, trip_by_line])
 def test_p4_a_watchdog_that_shows_in_the_fault_detail_alone_is_nobodys_stop(
@@ -165,6 +171,7 @@ def test_p4_a_watchdog_that_shows_in_the_fault_detail_alone_is_nobodys_stop(
         assert (rig.state.arming.disarmed_by, rig.state.tracking.track) == ("", "HOLD/FITTED")
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("status_without_system_faults")
 @pytest.mark.parametrize("trip", [trip_by_crash, trip_by_line])
 def test_p1_a_stop_in_a_long_outage_is_respected_once_the_fault_detail_shows_no_watchdog(
@@ -202,6 +209,7 @@ def test_p4_a_power_cycle_in_an_outage_is_nobodys_stop(rig: Rig) -> None:
 # A disarm is as durable as a latch
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("damage", [b"", b"{", None])
 def test_p1_a_disarm_outlives_a_crash_and_a_run_state_that_is_torn_or_gone(rig: Rig, damage: bytes | None) -> None:
     rig.ask("disarm")

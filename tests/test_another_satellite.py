@@ -37,6 +37,7 @@ def why(elements: ElementSet, real: RealPass, readings: Readings) -> str:
     return why_not_this_satellite(Sgp4Propagator(elements), real.site, SETTINGS, readings)
 
 
+@pytest.mark.long
 @needs_data
 @pytest.mark.parametrize("name", real_passes.names())
 @pytest.mark.parametrize("late_s", [0.0, 60.0, -60.0])

@@ -91,6 +91,7 @@ def _in_air(el_deg: float) -> float:
     return float(MODEL.refraction.apparent_el_deg(el_deg, 1e6, MODEL.refraction_scale))
 
 
+@pytest.mark.long
 @given(AZIMUTHS, ELEVATIONS, st.floats(4e5, 4e6))
 def test_the_partials_are_those_of_differences(az_deg, el_deg, range_m) -> None:
     h = 1e-4

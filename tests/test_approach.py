@@ -46,6 +46,7 @@ def off_the_rise_point_s(flight: Flight, target: Target) -> float:
     return max(off) - rise_tai_s
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("turn_deg", [-170.0, -155.0])
 def test_an_azimuth_of_one_and_a_half_degrees_a_second_is_at_the_rise_point_before_the_rise(turn_deg: float) -> None:
     """It needs 127 s for the way, more than a preposition_s of 60 s."""
@@ -70,6 +71,7 @@ def test_started_too_late_it_says_how_many_seconds_and_sets_out_at_once() -> Non
     assert standing - the_pass(target, DEMO_TAI_S).rise_tai_s < -58.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("off_deg", [0.0, 60.0])
 def test_started_in_mid_pass_it_says_how_long_after_the_rise_and_until_it_is_on_the_path(off_deg: float) -> None:
     target = demo_target()

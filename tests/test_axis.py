@@ -1,6 +1,7 @@
 """pointing.axis: the rate- and acceleration-limited follower of one axis."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -23,6 +24,7 @@ def _moving(start_deg: float, rate_deg_s: float, count: int) -> list[tuple[float
     return [(start_deg + rate_deg_s * DT_S * (k + 1), rate_deg_s) for k in range(count)]
 
 
+@pytest.mark.long
 @given(
     start=st.floats(-200.0, 200.0),
     target=st.floats(-200.0, 200.0),

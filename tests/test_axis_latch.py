@@ -67,6 +67,7 @@ LATCHES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fault", LATCHES)
 def test_p6_a_failing_axis_is_stopped_and_latched_and_nothing_moves_it_any_more(fault: str) -> None:
     flight = failing(fault)
@@ -94,6 +95,7 @@ def test_p6_a_runaway_in_autotrack_is_latched_too() -> None:
     assert failing("runaway axis=azimuth", is_lost=False).snapshots[-1].latch
 
 
+@pytest.mark.long
 def test_p6_cleared_while_the_axis_still_fails_it_is_latched_again_and_cleared_when_mended_it_goes_on() -> None:
     flight = climb(
         60.0,
@@ -107,6 +109,7 @@ def test_p6_cleared_while_the_axis_still_fails_it_is_latched_again_and_cleared_w
     assert worst_error_deg(flight, T + 52.0, T + 57.0) < HOLD_DEG
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fault", ["slow-drive axis=both", "wind axis=both", "backlash axis=both", "encoder-jump"])
 def test_p6_a_slow_drive_wind_backlash_and_a_slipped_encoder_latch_nothing(fault: str) -> None:
     assert failing(fault).snapshots[-1].latch == ""
@@ -133,6 +136,7 @@ def test_p1_with_manual_arming_nothing_is_written_until_a_person_arms() -> None:
     assert state_at(flight, T + 20.0) == "AUTOTRACK/FITTED"
 
 
+@pytest.mark.long
 def test_p1_disarmed_in_mid_pass_the_antenna_stands_and_armed_again_it_goes_back_to_the_fit() -> None:
     flight = climb(40.0, losses=[(LOST_S, 38.0)], script=[(15.0, says("disarm")), (25.0, says("arm"))])
     sent = [command for command in commands_between(flight, T + 15.005, T + 25.0) if not isinstance(command, QUESTIONS)]
@@ -148,6 +152,7 @@ def test_p1_disarmed_it_ends_without_another_stop() -> None:
     ] == []
 
 
+@pytest.mark.long
 def test_a_stop_by_another_hand_in_mid_pass_is_respected_until_a_person_arms() -> None:
     flight = climb(45.0, losses=[(LOST_S, 43.0)], script=[(15.05, acu_hears(Stop())), (25.0, says("arm"))])
     assert events_named(flight, "disarmed")[0]["by"] == "another hand that stopped the antenna"
@@ -169,6 +174,7 @@ def shadow() -> Flight:
     return climb(40.0, losses=[(25.0, 28.0)], script=[(5.0, somebody_steers), (20.0, says("arm"))], is_shadow=True)
 
 
+@pytest.mark.long
 def test_p1_a_shadow_sends_nothing_but_questions(shadow: Flight) -> None:
     assert all(isinstance(command, QUESTIONS) for _, command in shadow.commands)
     assert shadow.outcome is not None
@@ -213,6 +219,7 @@ def w_at(at_s: float, seen: list[int]):
     return (at_s, lambda stage: seen.append(parameter_w(stage.acu)))
 
 
+@pytest.mark.long
 def test_p4_the_register_watchdog_is_set_for_the_pass_again_after_a_power_cycle_and_cleared_at_the_end() -> None:
     codes: list[int] = []
     power_cycle = (12.05, lambda stage: stage.acu.power_cycle(stage.clock.tai_s()))
@@ -222,6 +229,7 @@ def test_p4_the_register_watchdog_is_set_for_the_pass_again_after_a_power_cycle_
     assert state_at(flight, T + 25.0) == "AUTOTRACK/FITTED"
 
 
+@pytest.mark.long
 def test_p4_a_silent_host_in_a_loss_is_stopped_by_the_acu_and_a_new_link_goes_on() -> None:
     def cut(is_cut: bool):
         return lambda stage: setattr(stage.link, "is_cut", is_cut)
@@ -234,6 +242,7 @@ def test_p4_a_silent_host_in_a_loss_is_stopped_by_the_acu_and_a_new_link_goes_on
     assert worst_error_deg(flight, T + 32.0, T + 43.0) < HOLD_DEG
 
 
+@pytest.mark.long
 def test_p4_a_watchdog_left_on_by_a_predecessor_hurts_nothing() -> None:
     def left(stage: ScriptAccess) -> None:
         stage.acu.answer(WriteParameter("W", 50))
@@ -252,6 +261,7 @@ class Stubborn(FakeAcu):
         return Nak() if isinstance(command, WriteParameter) else super().answer(command)
 
 
+@pytest.mark.long
 def test_an_acu_that_refuses_write_parameter_is_warned_of_once_and_tracked() -> None:
     flight = climb(25.0, make_acu=Stubborn)
     assert len(events_named(flight, "acu.sector_refused")) == 1

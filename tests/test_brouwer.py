@@ -82,6 +82,7 @@ def integrated(orbits: list[BrouwerElements], duration_s: float, j3: float) -> t
     return np.arange(len(states)) * STEP_S, np.array(states)
 
 
+@pytest.mark.long
 def test_the_theory_follows_the_integrated_j2_j4_problem_for_an_orbit_and_for_a_day() -> None:
     times, truth = integrated(ORBITS, DAY_S, j3=0.0)
     for k, orbit in enumerate(ORBITS):
@@ -96,6 +97,7 @@ def test_the_theory_follows_the_integrated_j2_j4_problem_for_an_orbit_and_for_a_
         assert np.max(np.abs(across_km)) < ONE_DAY_ACROSS_KM
 
 
+@pytest.mark.long
 def test_the_odd_harmonic_left_out_costs_little_in_a_day() -> None:
     times, truth = integrated(ORBITS, DAY_S, j3=J3)
     for k, orbit in enumerate(ORBITS):

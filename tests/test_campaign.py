@@ -83,6 +83,7 @@ def test_without_dask_the_message_says_how_to_install_it(monkeypatch: pytest.Mon
         run_campaign(reciprocal, [1], dask="tcp://127.0.0.1:1")
 
 
+@pytest.mark.long
 @needs_dask
 @pytest.mark.filterwarnings("ignore")  # dask's own, at the end of its cluster
 def test_a_cluster_of_two_workers_gives_the_same_results_and_failures() -> None:

@@ -368,6 +368,7 @@ def test_innovations_are_as_large_as_the_prior_says() -> None:
 # Real passes
 
 
+@pytest.mark.long
 @needs_data
 @pytest.mark.parametrize("along_s", [0.0, 1.0, 12.0])
 def test_a_second_real_pass_begins_nearer_to_the_satellite_than_the_first(along_s: float) -> None:

@@ -428,6 +428,7 @@ def daemon(directory: Path, answer: str) -> Iterator[None]:
         (directory / SOCKET).unlink()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("place", ["state", "state-rehearsal", "state/noaa-20"])
 @pytest.mark.parametrize(
     ("changes", "told", "words"),

@@ -106,6 +106,7 @@ def test_the_help_tells_the_first_steps_and_the_exit_statuses() -> None:
     assert "Exit status:" in acu_daemon("-h").out
 
 
+@pytest.mark.long
 def test_the_first_steps_work_as_printed_with_the_configuration_that_is_shipped(tmp_path: Path) -> None:
     """But for the port, which others may use, and the end of the run; they said that elements of 1989 are too old."""
     with socket.create_server(("127.0.0.1", 0)) as free:

@@ -41,6 +41,7 @@ def test_a_run_is_written_as_an_object_with_its_manoeuvres(tmp_path: Path) -> No
     assert (tmp_path / "run.png").stat().st_size > 10_000
 
 
+@pytest.mark.long
 def test_several_runs_are_a_list_and_a_table_and_the_same_however_many_processes_run() -> None:
     found = json.loads(simulate("--json", "--runs", 2, "--jobs", 1, "--seed", 3))
     assert [one["seed"] for one in found] == [3, 4]

@@ -230,6 +230,7 @@ def test_check_says_no_go_where_the_next_pass_is_not_covered(tmp_path: Path, mon
         assert line.startswith(verdict), lines
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("estimator", ["kalman", "full"])
 def test_replay_finds_the_satellite_of_an_ephemeris_that_runs_late(tmp_path: Path, estimator: str) -> None:
     one = first_high_pass()
@@ -278,6 +279,7 @@ def test_replay_of_a_recording_that_outlasts_the_ephemeris_is_refused_before_it_
     assert "to 2022-02-11T22:00:22Z; this one covers 2022-02-11T20:00:00Z to" in done.err
 
 
+@pytest.mark.long
 def test_the_daemon_stays_on_a_satellite_that_runs_off_its_ephemeris_through_a_loss(tmp_path: Path) -> None:
     one = first_high_pass()
     begin = one.rise_tai_s + 60.0

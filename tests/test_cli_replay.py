@@ -79,6 +79,7 @@ def rows_of(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+@pytest.mark.long
 @needs_data
 @pytest.mark.parametrize("estimator", [None, *sorted(ESTIMATORS)])
 def test_a_real_pass_is_predicted_through_its_loss_in_the_format_of_the_design(
@@ -108,6 +109,7 @@ def test_a_real_pass_is_predicted_through_its_loss_in_the_format_of_the_design(
     assert {row["source"] for row, is_lost in zip(rows, lost, strict=True) if is_lost} == {"HOLD/FITTED"}
 
 
+@pytest.mark.long
 @needs_data
 def test_all_estimators_are_compared_in_files_beside_the_named_one_a_table_and_a_picture(
     tmp_path: Path, config: Path, real: RealPass
@@ -163,6 +165,7 @@ def test_a_single_estimator_has_its_picture_and_table_and_an_antenna_that_stoppe
     assert float(row.split()[3]) < 0.1
 
 
+@pytest.mark.long
 @needs_data
 def test_the_readings_of_another_satellite_are_told_as_that_with_status_1(
     tmp_path: Path, config: Path, real: RealPass
@@ -226,6 +229,7 @@ def test_windows_files_and_blank_lines_give_the_same_predictions(tmp_path: Path,
     assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
 
 
+@pytest.mark.long
 @needs_data
 def test_what_is_recorded_later_changes_no_earlier_line(tmp_path: Path, config: Path, real: RealPass) -> None:
     readings, _ = recorded(tmp_path / "in.csv", real, share=0.5)
@@ -242,6 +246,7 @@ def test_what_is_recorded_later_changes_no_earlier_line(tmp_path: Path, config: 
     assert one != two
 
 
+@pytest.mark.long
 @needs_data
 def test_what_the_daemon_records_can_be_replayed(tmp_path: Path, config: Path, real: RealPass) -> None:
     tai_s = np.arange(real.tai_s[0], real.tai_s[60], 0.1)

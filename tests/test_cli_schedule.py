@@ -64,6 +64,7 @@ def test_the_table_has_the_same_and_the_calendar_the_granted_ones(config: Path) 
     assert starts == [to_the_second(str(one["start_utc"])) for one in granted]
 
 
+@pytest.mark.long
 def test_a_person_forces_a_pass_and_takes_the_word_back(config: Path) -> None:
     lost = next(one for one in found(config) if one["state"] == "refused")
     word = ("behind", lost["culmination_utc"])

@@ -23,6 +23,7 @@ DEMO = Path(cli.__file__).parent / "demo_config"
 RISE_TAI_S = coming_pass(load_target(DEMO, "demo-1", DEMO_TAI_S), DEMO_TAI_S).rise_tai_s
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("slow_s", [600.0, -400.0, 0.7], ids=["600 s slow", "400 s fast", "0.7 s slow"])
 def test_p7_a_clock_that_is_set_8_s_after_the_start_is_obeyed_at_once_and_the_coming_pass_is_made(
     slow_s: float, tmp_path: Path
@@ -38,6 +39,7 @@ def test_p7_a_clock_that_is_set_8_s_after_the_start_is_obeyed_at_once_and_the_co
     assert told.commands.count(Stop()) == 1  # at the end, and not between the two runs
 
 
+@pytest.mark.long
 def test_p7_a_step_while_the_pass_is_tracked_is_not_obeyed(tmp_path: Path) -> None:
     actions = [(40.0, lambda story: story.step(600.0))]
     told = tell(Story(DEMO, RISE_TAI_S - 5.0, 60.0, actions=actions), tmp_path / "state")
@@ -80,6 +82,7 @@ def test_what_people_say_between_two_runs_is_for_the_next_and_after_the_last_it_
     assert (told.snapshots[-1].arming, told.snapshots[-1].disarmed_by) == ("disarmed", "a person")
 
 
+@pytest.mark.long
 def test_a_stop_that_comes_while_a_run_begins_anew_ends_it(tmp_path: Path) -> None:
     def stop(story: Story) -> None:
         assert story.runs is not None

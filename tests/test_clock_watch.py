@@ -75,6 +75,7 @@ class Stepped(LoopClock):
         return self.step_s if T + 12.0 < self.tai_s() < T + 20.0 else 0.0001
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("step_s", [-3600.0, 1.0])
 def test_p7_a_step_in_mid_pass_is_an_alarm_in_the_snapshot_and_changes_no_command(step_s: float) -> None:
     class OneStep(Stepped):
@@ -97,6 +98,7 @@ class Late(LoopClock):
         await super().sleep_until(tai_s + (0.27 if T + 15.0 < tai_s < T + 17.0 else 0.0))
 
 
+@pytest.mark.long
 def test_p8_late_ticks_are_counted_and_the_writes_never_catch_up_in_a_burst() -> None:
     flight = climb(25.0, make_clock=Late)
     assert flight.outcome is not None

@@ -48,6 +48,7 @@ class Scripted(InlineFitRunner):
         return await super().refit(request)
 
 
+@pytest.mark.long
 def test_p9_the_fit_process_rests_by_its_deaths_in_a_row_and_an_answer_of_any_kind_ends_the_row() -> None:
     made: list[Scripted] = []
 

@@ -143,6 +143,7 @@ def test_jason_3_is_where_others_have_seen_it_by_the_same_prediction(name: str) 
         assert seen.range_m[i] / 1e3 == pytest.approx(range_km, abs=2e-4)
 
 
+@pytest.mark.long
 @needs_data
 @pytest.mark.parametrize(
     ("name", "within_m"), [("jason3_cpf_180613_16401.cne", 1.0), ("lageos1_cpf_180613_16401.hts", 0.05)]

@@ -87,6 +87,7 @@ def acquired_after_s() -> float:
     return next(seen.tai_s for seen in climb(4.0).snapshots if seen.state.startswith("AUTOTRACK")) - T
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("after_s", [0.8, 1.2, 2.0])
 def test_an_early_loss_makes_no_jump(after_s: float) -> None:
     lost_s = acquired_after_s() + after_s
@@ -120,6 +121,7 @@ def test_several_losses_in_a_row_are_each_held_and_relocked() -> None:
     assert all(seconds_to_state(flight, "AUTOTRACK/FITTED", T + end) <= RELOCK_S for _, end in losses)
 
 
+@pytest.mark.long
 def test_a_long_hold_never_empties_the_buffer() -> None:
     flight = climb(62.0, losses=[(15.0, 60.0)])
     filled = [seen for seen in flight.snapshots if seen.buffer_kind]
@@ -128,6 +130,7 @@ def test_a_long_hold_never_empties_the_buffer() -> None:
     assert flight.states()[-1] == "AUTOTRACK/FITTED"
 
 
+@pytest.mark.long
 def test_registers_are_within_a_tenth_of_a_degree_in_autotrack_after_ten_seconds() -> None:
     flight = climb(28.0)
     assert max(register_errors_deg(flight, sky_of(demo_target()), T + 15.0, T + 28.0)) < 0.1
@@ -142,6 +145,7 @@ def test_a_search_starts_only_after_hold_s() -> None:
     assert seconds_to_state(flight, "SEARCH", T + 12.0) == pytest.approx(20.2, abs=0.2)
 
 
+@pytest.mark.long
 def test_no_search_leaves_a_prediction_whose_three_sigma_are_within_the_beam() -> None:
     target = demo_target(fallback={"hold_s": 5.0, "search_s": 30.0}, tracking={"estimator": "full"})
     flight = climb(50.0, target, losses=[(25.0, 60.0)])
@@ -197,6 +201,7 @@ def test_a_link_that_is_hung_up_comes_back_at_once_and_autotrack_is_left_alone()
     assert worst_error_deg(flight, T + 7.0, T + 13.9) < HOLD_DEG
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("losses", [[], [(7.0, 30.0)]], ids=["autotrack", "hold"])
 def test_p2_on_another_connection_however_soon_it_came_all_is_read_again_before_anything_is_commanded(
     losses: list[tuple[float, float]],
@@ -220,6 +225,7 @@ def test_p3_a_long_silence_ends_within_two_seconds_of_its_cause() -> None:
     assert seconds_to_state(flight, "AUTOTRACK/FITTED", T + 30.0) < 3.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "blow",
     [
@@ -274,6 +280,7 @@ def test_under_the_local_panel_it_only_polls_and_comes_back_when_it_may() -> Non
     assert worst_error_deg(flight, T + 20.0, T + 25.0) < HOLD_DEG
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("losses", [[], [(8.0, 22.0)]], ids=["tracking", "lost"])
 def test_p3_after_a_power_cycle_of_the_acu_it_is_on_the_satellite_again_within_seconds(
     losses: list[tuple[float, float]],
@@ -439,6 +446,7 @@ class Mumbling(FakeAcu):
         return self.said.pop(0) if self.said and isinstance(command, Identify) else super().answer(command)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("garbled", [("3842", "Q1"), ("1842", "S1"), ("3842", "1S"), ("3802", "10")])
 def test_a_rehearsal_asks_again_when_the_identity_is_garbled(garbled: tuple[str, str]) -> None:
     Mumbling.said = [Identity(*garbled)]
@@ -453,6 +461,7 @@ def test_a_rehearsal_refuses_what_twice_says_it_is_another_acu() -> None:
         climb(10.0, make_acu=Mumbling)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("at_s", [8.03, 8.005], ids=["between two exchanges", "within one"])
 @pytest.mark.parametrize("losses", [[], [(6.0, 30.0)]], ids=["tracking", "lost"])
 def test_a_stop_in_mid_pass_leaves_the_acu_in_standby(losses: list[tuple[float, float]], at_s: float) -> None:
@@ -600,6 +609,7 @@ class Denied(InlineFitRunner):
         return replace(reply, fit=None, prediction=elements, model=Model.ELEMENTS)
 
 
+@pytest.mark.long
 def test_when_the_elements_steer_again_state_snapshot_and_live_line_say_so() -> None:
     flight = climb(27.0, losses=[(16.0, 25.5)], make_runner=Denied)
     states = flight.states()
@@ -628,6 +638,7 @@ class Leisurely(InlineFitRunner):
         return await super().refit(request)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("lost_s", [8.0, 8.2, 8.4, 8.6, 8.8])
 def test_a_loss_is_answered_by_a_fresh_buffer_at_once_or_as_soon_as_the_fit_in_hand_is_done(lost_s: float) -> None:
     made: list[Leisurely] = []
@@ -740,6 +751,7 @@ def test_p4_at_9600_baud_a_start_comes_to_its_first_write_of_the_path_in_half_a_
     assert first_write_tai_s - flight.commands[0][0] < 0.5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("baud", "latency_s"), [(9600, 0.013), (9600, 0.002), (19200, 0.010), (0, 0.020)])
 def test_p8_a_start_with_several_exchanges_in_a_tick_makes_the_next_tick_no_later(baud: int, latency_s: float) -> None:
     def ask(stage: ScriptAccess, line: str) -> None:
@@ -753,6 +765,7 @@ def test_p8_a_start_with_several_exchanges_in_a_tick_makes_the_next_tick_no_late
     assert flight.outcome.is_stopped
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("latency_s", [0.002, 0.010, 0.020])
 def test_at_9600_baud_the_registers_keep_their_rhythm_and_housekeeping_gets_through(latency_s: float) -> None:
     antenna = AcuChoice(azimuth_deg=168.0, elevation_deg=20.0, reply_latency_s=latency_s)

@@ -120,6 +120,7 @@ def test_whatever_is_answered_is_an_orbit_near_the_elements(
         assert 0.9 * one.semi_major_axis_m < float(orbit.a_m[0]) < 1.2 * one.semi_major_axis_m
 
 
+@pytest.mark.long
 def test_a_satellite_that_decays_in_days_has_its_passes_until_then(tmp_path: Path) -> None:
     directory = config(tmp_path, ECCENTRIC, EQUATOR)
     asked = ("passes", "--config", directory, "--from", "2018-11-03T05:00:00Z", "--json")
@@ -169,6 +170,7 @@ def test_a_pass_cut_by_the_decay_is_shown_up_to_it_and_none_after_it(tmp_path: P
     assert acu_daemon(*asked, "--from", utc_text(last + 300.0)).code == 2
 
 
+@pytest.mark.long
 @needs_data
 def test_no_satellite_of_a_real_list_decays_before_its_elements_are_too_old_but_those_about_to() -> None:
     packed = next((DATA / "tle_sets").glob("*.gz"))
@@ -203,6 +205,7 @@ class Ending:
         return Ending(self.source.corrected(correction), self.end_tai_s)
 
 
+@pytest.mark.long
 def test_a_pass_that_the_decay_cuts_is_tracked_on_the_prediction_up_to_it() -> None:
     target, known_s = demo_target(), 70.0
     end_tai_s = RISING_TAI_S + known_s

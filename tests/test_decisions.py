@@ -8,6 +8,8 @@ from test_mirrors import SEEDS, run_of
 
 from acu_daemon.drivers.sa3842.angles import LSB_DEG
 
+pytestmark = pytest.mark.long
+
 TOLERANCE_DEG = 1.5 * LSB_DEG  # a rounding that falls on the other side
 
 

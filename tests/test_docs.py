@@ -249,6 +249,7 @@ def test_an_example_of_a_scenario_is_taken(text: str, tmp_path: Path) -> None:
     read_scenario(path)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("text", examples("sh", "run"))
 def test_an_example_of_the_shell_runs(text: str) -> None:
     environment = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}

@@ -279,6 +279,7 @@ def test_a_reply_that_comes_too_late_is_not_the_next_commands(bench: Bench) -> N
     table.driver.forget()
 
 
+@pytest.mark.long
 @benches
 @given(noise=st.lists(st.binary(max_size=60), max_size=8))
 def test_noise_is_no_reply_and_raises_nothing_and_the_next_connection_is_clean(

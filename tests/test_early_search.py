@@ -17,6 +17,8 @@ from flights import (
 from acu_daemon.cli.options import Target
 from acu_daemon.sim.scenario import AcuChoice, SkyErrors
 
+pytestmark = pytest.mark.long
+
 FOUND_S = 60.0
 
 

@@ -87,6 +87,7 @@ def test_newer_elements_are_taken_while_it_waits_and_told(config: Path, tmp_path
     assert told.outcome.is_stopped
 
 
+@pytest.mark.long
 def test_the_pass_is_tracked_with_the_elements_that_came_while_it_was_waited_for(config: Path, tmp_path: Path) -> None:
     actions = [(5.0, moves(with_epoch(config, LATER_DAYS)))]
     told = tell(Story(config, RISE_TAI_S - 180.0, 240.0, actions=actions), tmp_path / "state")
@@ -127,6 +128,7 @@ def test_after_worse_ones_good_ones_are_still_taken(
     assert (len(told.named("elements.kept")), len(told.named("elements.taken"))) == (1, 1)
 
 
+@pytest.mark.long
 def test_in_mid_pass_nothing_is_taken(config: Path, tmp_path: Path) -> None:
     actions = [(20.0, moves(with_epoch(config, LATER_DAYS)))]
     told = tell(Story(config, RISE_TAI_S + 1.0, 40.0, actions=actions), tmp_path / "state")

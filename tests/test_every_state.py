@@ -211,6 +211,7 @@ def test_states_are_taken_apart_and_put_together_in_one_order():
     assert shift_m == (11.0, 12.0, 13.0)
 
 
+@pytest.mark.long
 def test_with_every_state_open_the_covariance_tells_the_errors_of_the_prediction():
     """Truths drawn from the prior; half a pass of readings; errors of the other half in their own sigmas."""
     chosen, squares, states = settings(range(STATE_COUNT)), [], []

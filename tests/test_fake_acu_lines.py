@@ -181,6 +181,7 @@ def test_the_memory_link_can_be_cut_hung_up_refused_and_opened_again() -> None:
     run_virtual(story())
 
 
+@pytest.mark.long
 def test_a_quarter_of_an_hour_of_exchanges_repeats_bit_for_bit() -> None:
     async def pass_of_two_minutes() -> list[TraceRow]:
         clock = LoopClock(START_TAI_S)

@@ -34,6 +34,7 @@ def flown(duration_s: float, **changes: object) -> Flight:
     return climb(duration_s, demo_target(tracking={"leave_false_lock": True}), **changes)
 
 
+@pytest.mark.long
 def test_a_side_lobe_is_left_and_the_satellite_is_tracked_again() -> None:
     push_deg = SIDE_LOBE_BEAMS * demo_target().station.receiver.beamwidth_deg
     losses = [(GUST_S - 1.0, GUST_S)]
@@ -45,6 +46,7 @@ def test_a_side_lobe_is_left_and_the_satellite_is_tracked_again() -> None:
     assert flight.snapshots[-1].false_lock_count == 1
 
 
+@pytest.mark.long
 def test_a_carrier_that_stands_still_like_the_sun_or_a_far_satellite_is_left() -> None:
     flight = flown(75.0, faults=["false-lock start_s=45 duration_s=15"])
     assert len(events_named(flight, "lock.false")) == 1
@@ -53,6 +55,7 @@ def test_a_carrier_that_stands_still_like_the_sun_or_a_far_satellite_is_left() -
     assert flight.states()[-1] == "AUTOTRACK/FITTED"
 
 
+@pytest.mark.long
 def test_a_lock_on_the_satellite_is_not_left_and_without_the_key_none_is() -> None:
     clean = flown(70.0, losses=[(40.0, 50.0)])
     assert events_named(clean, "lock.false") == []

@@ -325,6 +325,7 @@ def test_the_prior_of_a_state_is_that_state_in_elements():
     assert sigma[2] == pytest.approx(3.0 * 3.0 / v_m_s * np.sqrt(3.986004418e14 / 7180e3**3), rel=0.01)
 
 
+@pytest.mark.long
 def test_errors_lie_inside_the_ellipses_as_often_as_they_should():
     source, inside = circular(66.0, 0.001), []
     for run in range(60):
@@ -413,6 +414,7 @@ def _unseen_half_deg(real, source, bias, seed):
     return _errors_deg(source, real.site, fit, real.tai_s, az_deg, el_deg)[half:].max()
 
 
+@pytest.mark.long
 @needs_data
 @pytest.mark.parametrize("bias", [AngleBias(), BIAS])
 def test_after_half_of_a_real_pass_the_other_half_is_predicted(bias):

@@ -41,6 +41,7 @@ def drawn() -> Flight:
     return climb(END_S, sky=Drawn(sky_of(demo_target())))
 
 
+@pytest.mark.long
 def test_the_registers_stay_on_the_satellite_while_another_signal_draws_the_antenna_away(drawn: Flight) -> None:
     truth = sky_of(demo_target())
     assert max(register_errors_deg(drawn, truth, T + DRAWN_S + 6.0, T + LOST_S)) < 0.1
@@ -86,6 +87,7 @@ def on_side_lobe() -> Flight:
     return climb(LOBE_END_S, losses=losses, script=[(GUST_S, push(beam_deg))], receiver=LOUD)
 
 
+@pytest.mark.long
 def test_a_minute_on_the_side_lobe_is_named_and_leaves_the_registers_on_the_satellite(on_side_lobe: Flight) -> None:
     beam_deg = demo_target().station.receiver.beamwidth_deg
     on_lobe = rows_between(on_side_lobe, T + GUST_S + 2.0, T + CALM_S)

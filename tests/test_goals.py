@@ -103,6 +103,7 @@ def test_scripts_get_an_exit_status(tmp_path: Path) -> None:
     assert acu_daemon("wait", "idle", "--timeout", "nan").code == 2
 
 
+@pytest.mark.long
 def test_the_view_is_for_terminals_and_says_what_scripts_take(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "acu_daemon", "status", "--watch", "--state", str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60.0, check=False)

@@ -58,6 +58,7 @@ def error_m(found: dict[str, object]) -> float:
     return float(np.std(seen - orbit().drift_m(times_s, MANOEUVRES)))
 
 
+@pytest.mark.long
 def test_d_of_made_sets_is_true_to_ten_metres_and_every_manoeuvre_is_found(tmp_path: Path) -> None:
     found = from_elements(tmp_path / "made.json", made())
     assert (found["cycle_revolutions"], found["cycle_days"]) == (373, 26)
@@ -83,6 +84,7 @@ def test_without_manoeuvres_none_are_found(tmp_path: Path) -> None:
     assert from_elements(tmp_path / "made.json", quiet)["manoeuvres"] == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("reference", "ballistic_m2_kg", "day", "size_m"),
     [
@@ -186,6 +188,7 @@ def test_a_set_of_another_orbit_under_the_same_number_is_left_out_with_a_word(tm
     assert len(found["manoeuvres"]) == 3
 
 
+@pytest.mark.long
 @needs_data
 @pytest.mark.parametrize(("norad_id", "cycle"), [(39084, (233, 16)), (40697, (143, 10)), (41335, (385, 27))])
 def test_over_gaps_of_years_a_real_satellite_is_where_its_mission_keeps_it(

@@ -198,6 +198,7 @@ def test_the_sum_of_the_manoeuvres_is_what_drag_took_less_what_sun_and_moon_save
     assert outcome.flown.d_m.max() < 130.0
 
 
+@pytest.mark.long
 def test_the_whole_loop_holds_a_tight_band_for_weeks() -> None:
     case = Case("moderate", 100.0, days=24.0, seed=3)
     outcome = simulate(world(), case)
@@ -207,6 +208,7 @@ def test_the_whole_loop_holds_a_tight_band_for_weeks() -> None:
     assert 3 <= len(outcome.flown.manoeuvres) <= 8
 
 
+@pytest.mark.long
 def test_the_papers_controller_leaves_the_band_where_ours_holds_it() -> None:
     case = Case("critical", 100.0, navigator="perfect", days=200.0, execution_sigma=0.0)
     ours, paper = (simulate(world("critical"), replace(case, controller=one)).flown for one in ("ours", "paper"))

@@ -133,6 +133,7 @@ def test_rise_and_set_are_apparent_and_the_plan_is_of_the_encoders() -> None:
     assert plans[0].start_el_deg - plans[1].start_el_deg == pytest.approx(-0.3 + 0.2 + 0.03, abs=0.05)
 
 
+@pytest.mark.long
 def test_a_flight_in_air_that_was_told_holds_the_satellite_through_a_loss() -> None:
     target = demo_target(readings={"bias_sigma_elevation_deg": 0.02})
     scenario = Scenario(sky=SkyErrors(0.9, 0.015), air=AirChoice(refractivity_factor=1.08))

@@ -117,6 +117,7 @@ def test_the_error_is_what_the_covariance_says():
     assert abs(np.mean(distances) - 2.0) < 4 * 2.0 / np.sqrt(40)
 
 
+@pytest.mark.long
 @settings(max_examples=12, deadline=None)
 @given(cuts=st.lists(st.integers(1, 2999), max_size=40, unique=True))
 def test_how_the_readings_are_cut_into_batches_does_not_matter(cuts):

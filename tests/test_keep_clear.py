@@ -148,6 +148,7 @@ def test_stow_is_sent_only_where_its_straight_way_keeps_clear() -> None:
     assert why_not_stow(Envelope(AZIMUTH, ELEVATION), (20.0, 30.0), MORNING) == ""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 3, 12, 14, 15, 27])
 def test_a_whole_decision_in_troubles_writes_nothing_inside_and_leads_an_antenna_out(seed: int) -> None:
     """Signal, modes, faults, axes and people as they come: a box stands on the satellite's path."""

@@ -93,6 +93,7 @@ BOUNDS = {
 NONE_LOST_BELOW_DEG = {500: 88.6, 705: 89.2, 800: 89.4}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("height_km", "top_deg"), [(500, 89.0), (705, 89.3), (800, 89.99)])
 def test_the_stored_bounds_are_those_of_dynamic_programming(height_km, top_deg):
     rows = zenith_bound.overhead_pass(height_km, top_deg, span_s=15.0)

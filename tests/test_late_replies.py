@@ -184,6 +184,7 @@ def off_deg(flight: Flight, readings: list[tuple[float, float, float]]) -> list[
 CONSTANT = ("latency value=0.1 on=reply", "jitter value=0.04 seed=3 on=reply")  # beside the 10 ms of the ACU
 
 
+@pytest.mark.long
 def test_replies_110_to_150_ms_late_are_never_fitted_and_the_operator_is_told_how_late_they_are() -> None:
     flight, readings = fly_late(*CONSTANT)
     assert max(off_deg(flight, readings)) < TAGGED_DEG
@@ -196,6 +197,7 @@ def test_replies_110_to_150_ms_late_are_never_fitted_and_the_operator_is_told_ho
     assert state_at(flight, T + 40.0) == "AUTOTRACK/FITTED"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("late_s", [0.11, 0.15, 0.25, 0.45])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_replies_late_now_and_then_cost_a_write_each_and_no_reading_is_tagged_wrong(late_s: float, seed: int) -> None:

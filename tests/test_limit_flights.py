@@ -48,6 +48,7 @@ def under_a_ceiling() -> Flight:
     return flight_of(target, DEMO_TAI_S - 40.0, 60.0, antenna=antenna, losses=[(25.0, 90.0)])
 
 
+@pytest.mark.long
 def test_p5_an_elevation_below_the_satellite_is_held_at_its_limit_and_the_azimuth_follows() -> None:
     flight, sky = under_a_ceiling(), sky_of(demo_target())
     beyond = [row for row in flight.rows if (sky.direction(row.tai_s) or (0, 0, 0))[1] > 58.5]
@@ -70,6 +71,7 @@ def scd_below_66_deg() -> tuple[Flight, Target]:
     return flight_of(target, begin_tai_s, 80.0, antenna=antenna), target
 
 
+@pytest.mark.long
 def test_p5_a_satellite_above_the_elevation_limit_for_50_s_is_followed_in_azimuth_and_taken_again_below_it() -> None:
     flight, target = scd_below_66_deg()
     sky = sky_of(target)
@@ -92,6 +94,7 @@ def test_an_axis_at_its_limit_is_told_once_and_shown_while_it_lasts() -> None:
     assert flight.snapshots[200].limit_alarm == ""
 
 
+@pytest.mark.long
 def test_with_a_lowest_driven_elevation_above_the_rise_it_prepositions_there_and_takes_the_signal() -> None:
     target = with_elevation(demo_target(), min_deg=7.0)
     rise_tai_s = the_pass(target, RISING_TAI_S).rise_tai_s
@@ -106,6 +109,7 @@ def test_with_a_lowest_driven_elevation_above_the_rise_it_prepositions_there_and
     assert worst_error_deg(flight, rise_tai_s + 45.0, rise_tai_s + 50.0) < AXIS_DEG
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ends_deg", [(100.0, 250.0), (-10.0, 200.0), (140.0, 300.0)])
 def test_an_azimuth_narrower_than_the_pass_stands_at_the_nearer_end_while_the_elevation_follows(ends_deg) -> None:
     """The demo's pass crosses the zenith: its azimuth leaves 168 deg for 348 deg, which these ranges do not hold."""

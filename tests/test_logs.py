@@ -79,6 +79,7 @@ def test_what_json_does_not_know_is_written_as_text(capsys: pytest.CaptureFixtur
     assert json.loads(lines(capsys)[0])["where"] == "{1}"
 
 
+@pytest.mark.long
 def test_a_calm_pass_logs_changes_not_ticks() -> None:
     flight = climb(30.0, losses=[(12.0, 20.0)])
     assert len(flight.events) < 25

@@ -178,6 +178,7 @@ def test_a_segment_lasts_as_long_as_its_quality_and_the_line() -> None:
 # OMM
 
 
+@pytest.mark.long
 def test_an_omm_is_read_by_others_and_by_sgp4_and_is_the_fitted_orbit_within_a_metre(folder: Path) -> None:
     taped, watch = seen(flown(folder))
     text, fit = message(flown(folder), "omm"), watch.fits[-1].fit
@@ -226,6 +227,7 @@ def test_elements_are_moved_to_another_epoch_without_moving_the_orbit(days: floa
 # OEM
 
 
+@pytest.mark.long
 def test_an_oem_of_other_sources_is_the_fit_within_a_metre_and_padded(folder: Path) -> None:
     path = folder / f"scd{SUFFIX}"
     flight_of(scd_target(SCD_HIGH_TAI_S), SCD_HIGH_TAI_S, 20.0, antenna=DEMO_ANTENNA, tape=path)

@@ -186,6 +186,7 @@ def test_a_loss_that_ends_the_pass_is_no_relock_of_the_next_one() -> None:
     assert tally.relock.cumulated()[-1] == 0
 
 
+@pytest.mark.long
 def test_a_flight_is_counted_as_it_went() -> None:
     tally, target = Tally(), demo_target()
     begin = DEMO_TAI_S - 120.0
@@ -228,6 +229,7 @@ def test_promtool_finds_nothing_to_say_of_the_page() -> None:
         assert (done.returncode, done.stdout + done.stderr) == (0, b"")
 
 
+@pytest.mark.long
 @needs_promtool
 def test_the_alert_rules_are_valid_and_come_when_they_should_and_not_before() -> None:
     for words in (["check", "config", "prometheus.yml"], ["test", "rules", "alerts_test.yml"]):

@@ -68,6 +68,7 @@ def same(command: Command | None, of_mirror: Command | None, mirror: Mirror) -> 
     return abs(az_deg - of_mirror.az_deg) < TOLERANCE_DEG and abs(el_deg - of_mirror.el_deg) < TOLERANCE_DEG
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", MIRRORS)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_mirrored_world_gets_the_mirrored_commands_and_the_same_events(name: str, seed: int) -> None:

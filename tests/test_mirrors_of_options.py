@@ -150,6 +150,7 @@ def run_of(seed: int) -> tuple[EveryOption, list[tuple[ControlState, Orders]]]:
     return decision, list(decision.run(TICKS))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_mirrored_world_with_every_option_gets_the_mirrored_commands_and_the_same_events(seed: int) -> None:
     mirror = BY_SEED[seed % 2]  # what is above hills has no mirror below

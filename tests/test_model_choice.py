@@ -103,6 +103,7 @@ def _replies(refitter: Refitter, readings: Readings) -> list[RefitReply]:
     return [refitter.refit(RefitRequest(one, one.tai_s[0], 2.0, one.tai_s[0], 180.0)) for one in parts]
 
 
+@pytest.mark.long
 def test_another_satellite_does_not_shake_what_the_last_pass_left() -> None:
     refitter = Refitter(RefitSetup(SOURCE, WHERE, "full", SETTINGS, AZIMUTH, carried=_left(LATE)))
     good = _path(LATE, 120)
@@ -114,6 +115,7 @@ def test_another_satellite_does_not_shake_what_the_last_pass_left() -> None:
     assert _replies(refitter, good.part(slice(60, 120)))[-1].model is Model.NEW_FIT
 
 
+@pytest.mark.long
 def test_a_carried_orbit_that_is_denied_is_gone_for_good_even_where_the_fit_starts_afresh_later() -> None:
     refitter = Refitter(RefitSetup(SOURCE, WHERE, "full", SETTINGS, AZIMUTH, carried=_left(LATE)))
     moved = Correction(delta_mean_anomaly_rad=np.radians(0.3))
@@ -136,6 +138,7 @@ def test_what_the_last_pass_left_is_no_model_for_an_estimator_without_a_covarian
     assert refitter.refit(RefitRequest(Readings.of([]), now_tai_s, 2.0, now_tai_s, 180.0)).model is Model.ELEMENTS
 
 
+@pytest.mark.long
 def test_the_buffer_says_what_it_is_made_from() -> None:
     refitter = Refitter(RefitSetup(SOURCE, WHERE, "full", SETTINGS, AZIMUTH, carried=_left(LATE)))
     readings = _path(LATE, 60)

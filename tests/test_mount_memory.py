@@ -187,6 +187,7 @@ def after_swings(swing_deg: float, peak: float) -> tuple[PedestalMemory, list[Up
     return memory, told
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("swing_deg, peak", [(0.02, 0.1), (0.03, 0.6), (0.0, 0.0)])
 def test_what_sun_and_night_do_to_the_zero_points_is_learnt_and_predicted_for_any_time_of_the_day(
     swing_deg: float, peak: float
@@ -220,6 +221,7 @@ def test_a_zero_point_swings_no_farther_than_what_was_known_of_it_before_any_pas
         assert np.sqrt(np.diag(seen.at(float(tai_s)).covariance)) == pytest.approx(a_priori_sigmas(SETTINGS)[1])
 
 
+@pytest.mark.long
 def test_zero_points_that_hold_still_are_told_from_those_that_move_and_better_known() -> None:
     """Evidence of a pass is at most some units, and bounded, so that a pedestal that begins to move is found out."""
     still, _ = after_swings(0.0, 0.0)
@@ -429,6 +431,7 @@ def refitted(setup: RefitSetup, readings: Readings, step_s: float = 60.0) -> lis
     return replies
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["full", "kalman"])
 def test_a_session_tells_what_the_pass_says_of_the_pedestal_whatever_estimator_predicts(name: str) -> None:
     one = passes(CROOKED, 1)[0]
@@ -444,6 +447,7 @@ def test_a_session_tells_what_the_pass_says_of_the_pedestal_whatever_estimator_p
     assert alone[-1].fit == replies[-1].fit  # an empty memory changes no prediction
 
 
+@pytest.mark.long
 def test_a_session_begins_with_the_memory_and_says_once_that_it_is_set_aside_and_used_again(
     crooked: PedestalMemory,
 ) -> None:

@@ -3,11 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from flights import RISING_TAI_S, climb, demo_target, worst_error_deg
 
 from acu_daemon.assist.mount_memory.pedestal_memory import PedestalMemory, Remembered, first_memory
 from acu_daemon.config.to_settings import estimator_settings
 from acu_daemon.units import DEG
+
+pytestmark = pytest.mark.long
 
 BIASES_DEG = (0.15, -0.15)  # of the encoders, as the simulator has them
 TARGET = demo_target()

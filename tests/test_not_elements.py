@@ -147,6 +147,7 @@ def test_a_name_whose_lines_are_missing_is_the_first_thing_said(tmp_path: Path) 
     assert "line 4: 'ISS (ZARYA)' is neither an element line nor the name of a set below it" in done.err.splitlines()[0]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["2 PATHFINDER", "1 KUNS-SAT", "2 45727"])
 def test_an_object_whose_name_looks_like_a_line_number_is_found_by_it(tmp_path: Path, name: str) -> None:
     text = ISS + PATHFINDER.replace("2 PATHFINDER", name)
@@ -325,6 +326,7 @@ def test_the_cases_that_people_sent_have_their_right_answers(case: str, start: s
     assert said in done.out + done.err
 
 
+@pytest.mark.long
 @needs_data
 def test_a_list_of_16000_sets_is_searched(tmp_path: Path) -> None:
     packed = next((DATA / "tle_sets").glob("*.gz"))

@@ -38,6 +38,7 @@ def stuck() -> Flight:
     return climb(40.0, losses=[(18.0, 1e3)], faults=faults)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fly", [zenith, stuck])
 def test_on_and_off_are_true_of_the_antenna_in_every_state_that_steers(fly: Callable[[], Flight]) -> None:
     flight = fly()

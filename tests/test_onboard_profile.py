@@ -310,6 +310,7 @@ def test_what_is_wrong_with_a_pass_is_told_with_what_to_change(
     assert said in str(told.value)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("change", "said"),
     [

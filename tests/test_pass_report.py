@@ -171,6 +171,7 @@ def test_a_recording_that_is_none_or_damaged_is_told_and_all_others_have_their_r
     assert acu_daemon("report", tmp_path / f"torn{SUFFIX}").code == 1
 
 
+@pytest.mark.long
 def test_a_pass_that_is_lost_for_good_is_told_as_lost_and_not_as_tracked(tmp_path: Path) -> None:
     path = tmp_path / f"lost{SUFFIX}"
     climb(45.0, losses=[(8.0, 60.0)], tape=path)
@@ -210,6 +211,7 @@ def test_a_report_of_a_recording_that_replays_otherwise_says_so(tmp_path: Path) 
     assert (done.code, "decides otherwise: tick" in done.err) == (1, True)
 
 
+@pytest.mark.long
 @pytest.mark.skipif(BROWSER is None, reason="chromium is not installed")
 def test_a_browser_without_a_network_shows_the_page(folder: Path) -> None:
     figures_of("receiver-fault", folder)

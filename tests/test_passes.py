@@ -50,6 +50,7 @@ def check_against_scan(
     return len(passes)
 
 
+@pytest.mark.long
 @needs_data
 @pytest.mark.parametrize("seed", range(16))
 def test_no_pass_of_real_satellites_is_missed_in_three_days_grazing_ones_included(seed: int) -> None:
@@ -66,6 +67,7 @@ def test_no_pass_of_real_satellites_is_missed_in_three_days_grazing_ones_include
         assert count >= 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("orbit", [(26600.0, 0.72, 63.4), (24400.0, 0.73, 7.0), (26560.0, 0.01, 55.0)])
 def test_eccentric_and_high_orbits_are_found_too(orbit: tuple[float, float, float]) -> None:
     propagator = brouwer(*orbit)

@@ -154,6 +154,7 @@ def test_what_is_learned_beside_another_model_begins_anew_and_beside_the_same_on
     assert same == pytest.approx((2.0 + 0.6 * (measured[0] - 2.0), 0.3 + 0.6 * (measured[1] - 0.3)))
 
 
+@pytest.mark.long
 def test_without_any_fit_what_was_learned_holds_the_path_through_the_pass() -> None:
     """The fit process never answers; the satellite is 3 s late: 0.2 deg of azimuth now, 3 deg a minute later."""
     flight = flight_of(

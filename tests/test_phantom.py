@@ -35,6 +35,7 @@ def flown(target: Target, **changes: object) -> PhantomPass:
     return fly_phantom(source, site, coming, config, keyhole_rules(target.station), (100.0, 45.0))
 
 
+@pytest.mark.long
 def test_a_pass_over_the_zenith_costs_what_its_plan_says_and_nothing_else() -> None:
     found = flown(demo_target())
     assert found.up_s == pytest.approx(180.0, abs=0.2)
@@ -77,6 +78,7 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> tuple[Night, list[str], l
     return night(tmp_path_factory.mktemp("short"), minutes=4.0, script=script, has_phantom=True), answers, told
 
 
+@pytest.mark.long
 def test_what_it_finds_is_in_the_log_the_status_and_what_the_report_is_made_from(short) -> None:  # type: ignore[no-untyped-def]
     found, answers, told = short
     [flown] = found.days.named("phantom.flown")

@@ -120,6 +120,7 @@ def test_a_plan_over_the_top_needs_no_turn_beyond_a_stop() -> None:
     assert plan.unwindings == plan.beyond == ()
 
 
+@pytest.mark.long
 def test_a_pass_within_half_a_beam_of_the_zenith_is_not_lost_and_is_fitted_on_beyond_it() -> None:
     flight = over_the_zenith(plunging(500, 89.6), before_s=30.0, after_s=25.0)
     assert lost_s(flight) == 0.0

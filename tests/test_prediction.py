@@ -121,6 +121,7 @@ def test_a_satellite_that_is_late_is_where_the_frame_of_the_track_has_it(where, 
             assert apart_deg < 0.001 * abs(late_s)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("now_s", [-30.0, 0.0, 30.0])
 def test_however_far_back_a_buffer_begins_its_turn_is_the_one_asked_for_at_the_instant_of_asking(now_s):
     setup = RefitSetup(circular(), OVERHEAD, "full", EstimatorSettings(), DRIVE)

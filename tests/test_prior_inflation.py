@@ -48,6 +48,7 @@ def off_and_sigma_deg(fit: FitResult | None, km: float, tai_s: Any) -> tuple[Any
     return sky_angles_deg(seen.az_deg, seen.el_deg, real.az_deg, real.el_deg), sigma
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("km", [49.0, -49.0, 200.0])
 @pytest.mark.parametrize("count", [60, 300])
 def test_elements_sixteen_sigmas_off_are_recovered_with_a_note(km: float, count: int) -> None:

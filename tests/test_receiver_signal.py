@@ -167,6 +167,7 @@ def test_a_wrong_key_says_what_is_expected(tmp_path: Path, keys: str, reason: st
 # Flown
 
 
+@pytest.mark.long
 def test_a_rotator_with_a_receiver_shows_lock_and_loss_and_makes_no_fit(tmp_path: Path) -> None:
     station = STATION + 'signal = "udp://127.0.0.1:4842"\n'
     target = load_target(config_files.write(tmp_path, station), "scd", tai_from_utc("1989-02-01T01:40:00Z"))
@@ -222,6 +223,7 @@ def test_an_acu_with_autotrack_that_is_led_by_program_track_makes_no_fit_of_its_
     assert not any(seen.rejected_counts for seen in late)
 
 
+@pytest.mark.long
 def test_what_the_acu_calls_acquired_and_the_receiver_denies_is_held_and_not_fitted() -> None:
     target = demo_target(receiver={"signal": "udp://127.0.0.1:4842"})
     begin = DEMO_TAI_S - 120.0

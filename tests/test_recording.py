@@ -123,6 +123,7 @@ def full_at() -> Iterator[Callable[[int], None]]:
     resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
+@pytest.mark.long
 def test_p10_a_recording_goes_on_with_whole_lines_when_there_is_space_again(
     tmp_path: Path, full_at: Callable[[int], None]
 ) -> None:

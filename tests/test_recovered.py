@@ -168,6 +168,7 @@ TROUBLES: dict[str, tuple[Change, int, set[str]]] = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("trouble", TROUBLES)
 def test_after_good_ticks_the_memory_is_that_of_a_run_without_the_trouble(trouble: str) -> None:
     change, lasts, stays = TROUBLES[trouble]

@@ -98,6 +98,7 @@ def test_there_and_back_is_the_same_elevation(
     assert float(refraction.geometric_el_deg(apparent, range_m, scale)) == pytest.approx(el_deg, abs=BOTH_WAYS_DEG)
 
 
+@pytest.mark.long
 @settings(max_examples=20)
 @given(st.floats(1e6, 4e6) | st.just(np.inf), st.floats(100.0, MOST_N))  # at the horizon no satellite is nearer
 def test_from_below_the_horizon_over_the_zenith_it_rises_without_a_step(range_m: float, surface_n: float) -> None:

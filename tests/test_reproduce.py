@@ -93,6 +93,7 @@ def test_the_table_of_the_reference_orbit_agrees_with_the_integrator_between_its
     assert np.abs(coarse.states_teme(tai_s)[0] - fine.states_teme(tai_s)[0]).max() < 0.02
 
 
+@pytest.mark.long
 @needs_brahe
 def test_the_second_pass_has_the_geometry_of_the_papers(second_pass: TruePass) -> None:
     assert second_pass.duration_s == pytest.approx(450.0, abs=5.0)  # Kuga and Carrara 1990, table 1: 7:30
@@ -118,6 +119,7 @@ def test_more_readings_lower_the_bound_and_the_papers_methods_stay_above_it(seco
         assert np.all(eps_deg > bounds)
 
 
+@pytest.mark.long
 @needs_brahe
 def test_the_command_writes_the_rows_as_json(tmp_path: Path) -> None:
     out = tmp_path / "rows.json"
@@ -134,6 +136,7 @@ def test_the_command_writes_the_rows_as_json(tmp_path: Path) -> None:
     assert "[####" in done.stderr
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

@@ -105,6 +105,7 @@ def test_the_same_run_is_gone_on_from_with_its_fit_and_its_memory(tmp_path: Path
     assert "run.resumed" in said
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("before", sorted(ESTIMATORS))
 @pytest.mark.parametrize("after", sorted(ESTIMATORS))
 def test_the_fit_of_another_estimator_is_not_gone_on_from(tmp_path: Path, before: str, after: str) -> None:

@@ -36,6 +36,7 @@ def house(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.long
 def test_the_picture_of_the_rooms_is_that_of_the_code() -> None:
     drawn = (ROOT / rooms.PICTURE).read_text(encoding="utf-8")
     assert drawn == rooms.draw(rooms.read_house(ROOT)), "draw it anew: scripts/draw_rooms.py"

@@ -445,6 +445,7 @@ def test_p5_whatever_the_memory_holds_every_order_has_passed_the_fence(
     check_fence(remembering(moving(track, mode), **memory), seen, FITTED if is_fitted else SKY, is_shadow=is_shadow)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("is_shadow", [False, True])
 def test_p5_from_every_state_mode_and_stage_every_order_has_passed_the_fence(is_shadow: bool) -> None:
     """All there are, where chance would find the one that matters once in thousands."""

@@ -80,6 +80,7 @@ def searched(
         scan = go_on(scan, prediction, Reading(t, az_deg % 360.0, el_deg, False), t, PERIOD_S, config)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("beamwidth_deg", [0.5, 1.0, 2.5])
 def test_what_the_keys_say_is_covered_along_first_then_right_and_left_in_turn_without_a_gap(
     beamwidth_deg: float,
@@ -127,6 +128,7 @@ def test_no_row_is_searched_faster_than_the_beam_or_the_drives_allow(rate: float
         assert abs(point.az_rate_deg_s) <= max(0.8 * drive, abs(still.az_rate_deg_s)) + 1e-6
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("el_deg", "el_rate_deg_s"), [(5.3, 0.0), (5.5, 0.02), (88.9, 0.0)])
 def test_the_search_never_looks_below_the_mask_nor_beyond_a_limit_and_counts_nothing_there(
     el_deg: float, el_rate_deg_s: float
@@ -188,6 +190,7 @@ def test_another_prediction_is_searched_anew() -> None:
     assert go_on(scan, other, Reading(20.0, 0.0, 40.0, False), 20.0, PERIOD_S, CONFIG).rows == ()
 
 
+@pytest.mark.long
 def test_the_covariance_widens_what_is_searched_after_what_the_keys_say() -> None:
     wide = replace(PATH, spread=(5.0, 1.2))
     keys, whole = boxes(wide, CONFIG)[-2:]
@@ -225,6 +228,7 @@ def search_flight(late_s: float, raan_deg: float, for_s: float) -> Flight:
     return flight_of(target, RISING_TAI_S, for_s, antenna=RISING_ANTENNA, errors=errors)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("late_s", "raan_deg", "limit_s"), [(-8.0, 0.0, 20.0), (8.0, 0.0, 20.0), (0.0, 0.1, 40.0), (0.0, -0.1, 40.0)]
 )
@@ -242,12 +246,14 @@ def test_a_beam_of_half_a_degree_finds_a_satellite_early_late_left_and_right(
     assert el_deg_s <= 5.0
 
 
+@pytest.mark.long
 def test_eight_seconds_late_are_found_also_where_the_pass_is_fast() -> None:
     target = demo_target(fallback={"acquire_s": 3.0}, receiver={"beamwidth_deg": 0.5})
     flight = flight_of(target, DEMO_TAI_S, 46.0, antenna=DEMO_ANTENNA, errors=SkyErrors(along_track_s=8.0))
     assert seconds_to_state(flight, "AUTOTRACK/TLE", DEMO_TAI_S) < 45.0
 
 
+@pytest.mark.long
 def test_a_search_says_what_it_will_not_reach_and_the_next_one_goes_on() -> None:
     fallback = {"acquire_s": 3.0, "hold_s": 3.0, "search_s": 6.0}
     target = demo_target(fallback=fallback, receiver={"beamwidth_deg": 0.5})
@@ -263,6 +269,7 @@ def test_a_search_says_what_it_will_not_reach_and_the_next_one_goes_on() -> None
     assert min(covered(text)[0] for text in shown if text) < -12.0
 
 
+@pytest.mark.long
 def test_a_search_of_a_minute_covers_all_that_the_keys_say_and_is_taken_up_in_mid_row() -> None:
     """The second search begins where the first one stopped, in the middle of a row beside the path."""
     target = demo_target(fallback={"hold_s": 5.0, "search_s": 20.0}, tracking={"estimator": "kalman"})

@@ -70,6 +70,7 @@ def hill() -> tuple[float, float]:
     return coming_pass(TARGET, LOW_TAI_S).hidden_tai_s[0]
 
 
+@pytest.mark.long
 def test_a_hill_in_mid_pass_is_no_loss_and_not_searched(flight: Flight) -> None:
     hides, shows = hill()
     assert shows - hides > 20.0

@@ -56,6 +56,7 @@ PARK = '[schedule]\nafter = "park"\npark_az_deg = 20.0\npark_el_deg = 60.0\nnext
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory: pytest.TempPathFactory) -> Night:
+    HEARD_TAI_S.clear()
     return night(tmp_path_factory.mktemp("plain"), PARK + HORN, minutes=7.0, script=[(START, hear_the_horn)])
 
 
@@ -72,6 +73,7 @@ def hear_the_horn(access: StationAccess) -> None:
     access.runs.day.hooks.call = called  # type: ignore[method-assign]
 
 
+@pytest.mark.long
 def test_the_horn_is_heard_before_each_unasked_move_and_the_antenna_is_watched_meanwhile(plain: Night) -> None:
     rows = plain.days.rows
     moves = [now.tai_s for before, now in pairwise(rows) if (before.mode, now.mode) == (STANDBY, AcuMode.REMOTE)]
@@ -97,6 +99,7 @@ def test_after_a_pass_it_parks_where_the_next_one_is_far(plain: Night) -> None:
     assert (last.encoder_az_deg, last.encoder_el_deg) == (pytest.approx(20.0, abs=0.1), pytest.approx(60.0, abs=0.1))
 
 
+@pytest.mark.long
 def test_a_pass_that_is_a_no_go_is_tried_again_and_tracked_once_it_is_none(tmp_path: Path) -> None:
     fixed_at = START + 170.0
 
@@ -108,12 +111,14 @@ def test_a_pass_that_is_a_no_go_is_tried_again_and_tracked_once_it_is_none(tmp_p
     assert found.of("scd").state in (PassState.DONE, PassState.DEGRADED)
 
 
+@pytest.mark.long
 def test_one_that_stays_a_no_go_fails_with_its_reason_and_the_antenna_does_not_move(tmp_path: Path) -> None:
     found = night(tmp_path, minutes=6.0, check=lambda name, _tai_s: ["door: open"] if name == "scd" else [])
     assert (found.of("scd").state, found.of("scd").reason) == (PassState.FAILED, "not begun: door: open")
     assert {row.mode for row in found.days.rows if row.tai_s < found.of("scd").set_tai_s} == {AcuMode.STANDBY}
 
 
+@pytest.mark.long
 def test_a_kill_in_mid_pass_is_gone_on_from_and_nothing_is_lost(tmp_path: Path) -> None:
     def kill(_access: StationAccess) -> None:
         raise KilledError
@@ -147,6 +152,7 @@ def test_a_persons_words_hold_at_once_and_a_bad_file_is_refused_while_the_old_on
     assert "in_force" in found.days.named("config.kept")[0]
 
 
+@pytest.mark.long
 def test_strong_wind_begins_no_pass_and_says_so(tmp_path: Path) -> None:
     (tmp_path / "wind.json").write_text('{"mean_m_s": 20.0, "gust_m_s": 25.0, "utc": "1989-02-01T02:03:00Z"}')
     wind = f'[wind]\nfile = "{tmp_path}/wind.json"\nmax_age_s = 3600\n'

@@ -52,6 +52,7 @@ def test_stow_is_the_schedules_and_the_next_pass_ends_it(tmp_path: Path) -> None
     assert [one["by"] for one in found.named("stow.begins")] == ["schedule"]
 
 
+@pytest.mark.long
 def test_a_pass_that_is_due_on_the_way_to_the_stow_begins_once_it_is_reached_and_takes_it_for_nobodys(
     tmp_path: Path,
 ) -> None:

@@ -19,6 +19,7 @@ ENDS_S = 4.8  # minutes from START
 ACROSS_DEG = 0.4
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("words", ["", f" satellite=scd at={utc_text(RISE + 30.0)}"])
 def test_a_pass_that_is_skipped_by_name_or_without_is_given_up_with_a_stop_and_cancelled(
     tmp_path: Path, words: str
@@ -45,6 +46,7 @@ def test_the_next_pass_is_skipped_or_not_by_a_word_and_another_gets_its_time(tmp
     assert found.of("behind").state is PassState.PLANNED
 
 
+@pytest.mark.long
 def test_a_pause_begins_no_pass_and_what_it_costs_is_cancelled_by_name(tmp_path: Path) -> None:
     answers: list[str] = []
     until = utc_text(START + 1000.0, 0)

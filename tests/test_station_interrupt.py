@@ -40,6 +40,7 @@ def forced(directory: Path, *, may: bool) -> Night:
         return Night(days, file.book(START))
 
 
+@pytest.mark.long
 def test_one_that_may_interrupt_takes_the_antenna_over_without_a_stop_between(tmp_path: Path) -> None:
     found = forced(tmp_path, may=True)
     scd, behind = found.of("scd"), found.of("behind")
@@ -73,6 +74,7 @@ def test_where_the_one_that_interrupts_cannot_begin_the_antenna_is_stopped(
     assert found.of("behind").state is PassState.PLANNED
 
 
+@pytest.mark.long
 def test_one_whose_file_says_nothing_of_it_waits_though_a_person_forces_it(tmp_path: Path) -> None:
     found = forced(tmp_path, may=False)
     assert found.of("scd").state is PassState.DONE  # cut short by the end of the test

@@ -44,12 +44,14 @@ def test_a_plan_and_a_phantom_pass_that_fail_are_told_and_the_pass_is_tracked(
     assert found.of("scd").state is PassState.DONE
 
 
+@pytest.mark.long
 def test_a_check_that_fails_itself_is_a_no_go(tmp_path: Path) -> None:
     found = night(tmp_path, minutes=5.0, check=spoilt)
     reason = "not begun: the check failed: ZeroDivisionError: division by zero"
     assert (found.of("scd").state, found.of("scd").reason) == (PassState.FAILED, reason)
 
 
+@pytest.mark.long
 def test_peoples_words_that_cannot_be_read_any_more_hold_as_they_were_and_it_is_an_alarm(tmp_path: Path) -> None:
     answers: list[str] = []
 
@@ -78,6 +80,7 @@ def test_an_alarm_whose_figures_change_is_told_to_the_hook_once() -> None:
     assert told == [["silent for 9 s"], ["silent for 1 s"]]
 
 
+@pytest.mark.long
 def test_a_rest_that_ends_for_another_reason_while_the_horn_is_heard_moves_nothing(tmp_path: Path) -> None:
     heard: list[float] = []
 

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pytest
 from test_station import START, Night, configured, night
 
 from acu_daemon.acu.commands import STOW_MODES, AcuMode
@@ -37,6 +38,7 @@ def says(line: str, answers: list[str]) -> Action:
     return lambda access: answers.append(access.runs.answer(line, "a person"))
 
 
+@pytest.mark.long
 def test_wind_in_mid_pass_stows_and_the_pass_goes_on_once_it_is_calm_again(tmp_path: Path) -> None:
     script = [
         (START, blows(tmp_path, CALM)),
@@ -68,6 +70,7 @@ def test_a_kill_while_stowed_for_the_wind_forgets_neither_the_stow_nor_how_calm_
     assert (scd.state, scd.reason.split(",")[0]) == (PassState.FAILED, "not begun: wind strong")
 
 
+@pytest.mark.long
 def test_a_persons_stow_lets_no_pass_begin_until_a_person_ends_it(tmp_path: Path) -> None:
     answers: list[str] = []
     script = [(START + 5.0, says("stow", answers)), (RISE + 20.0, says("unstow", answers))]
@@ -77,6 +80,7 @@ def test_a_persons_stow_lets_no_pass_begin_until_a_person_ends_it(tmp_path: Path
     assert [one.split(":")[0] for one in answers] == ["ok stowed", "ok the stow is over, it was the operator's"]
 
 
+@pytest.mark.long
 def test_a_strong_winds_stow_is_no_persons_to_end_and_a_stale_ones_is(tmp_path: Path) -> None:
     answers: list[str] = []
     script = [

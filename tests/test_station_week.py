@@ -13,6 +13,8 @@ from acu_daemon.edge.schedule_file import ScheduleFile
 from acu_daemon.orbit.timescales import utc_text
 from acu_daemon.schedule.book import PassState
 
+pytestmark = pytest.mark.long
+
 week = load("station_week")
 ENDS = START + 1500.0
 

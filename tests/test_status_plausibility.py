@@ -159,11 +159,13 @@ def test_no_motion_that_the_drive_can_make_is_doubted(az_deg_s: float, el_deg_s:
     assert all(told(*path))
 
 
+@pytest.mark.long
 def test_through_the_zenith_nothing_is_doubted() -> None:
     flight = flight_of(demo_target(), DEMO_TAI_S, 92.0, antenna=DEMO_ANTENNA, losses=[(50.0, 70.0)], noise_deg=0.05)
     assert not events_named(flight, "acu.doubted")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(3))
 def test_a_loss_is_held_on_a_line_whose_garble_the_check_byte_does_not_see(seed: int) -> None:
     """P5: three replies in ten are changed."""
@@ -174,6 +176,7 @@ def test_a_loss_is_held_on_a_line_whose_garble_the_check_byte_does_not_see(seed:
     assert flight.states()[-1] == "AUTOTRACK/FITTED"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("probability", "seed"), [(0.8, 2), (0.8, 13), (0.8, 15), (1.0, 14), (1.0, 16), (1.0, 18), (1.0, 23)]
 )

@@ -127,6 +127,7 @@ def ends(stage: Rigged) -> None:
     stage.service.stop("SIGTERM")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("back_s", [18.0, 60.0], ids=["the link comes back", "it does not"])
 def test_p1_disarmed_and_ended_while_the_link_is_down_it_is_stopped_or_the_end_is_no_success(back_s: float) -> None:
     script = [(15.0, cut(True)), (16.0, says("disarm")), (17.0, ends), (back_s, cut(False))]
@@ -169,6 +170,7 @@ def test_p1_a_latch_of_the_last_run_is_stopped_where_the_daemon_is_armed_and_els
     assert set(orders) == ({Stop()} if is_armed else set())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("after_s", [0.001, 0.15, 0.4])
 def test_p4_started_again_after_a_crash_and_ended_at_once_it_stops_what_the_one_before_has_left(
     tmp_path: Path, after_s: float
@@ -201,6 +203,7 @@ def test_p4_started_again_without_a_link_and_ended_it_stops_what_the_one_before_
         assert task.result().is_stopped
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("after_s", [0.001, 0.15, 0.4])
 @pytest.mark.parametrize("is_cut", [False, True], ids=["", "the link comes back later"])
 def test_p1_disarmed_soon_after_a_crash_it_stops_what_the_one_before_has_left(
@@ -219,6 +222,7 @@ def test_p1_disarmed_soon_after_a_crash_it_stops_what_the_one_before_has_left(
         assert rig.acu.status().mode is AcuMode.STANDBY
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("is_latched", [False, True])
 def test_p1_disarmed_without_a_link_and_killed_the_next_one_stops_it_and_only_once(
     tmp_path: Path, *, is_latched: bool

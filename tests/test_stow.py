@@ -197,6 +197,7 @@ def test_a_person_who_disarms_does_not_interrupt_it() -> None:
 # In flight
 
 
+@pytest.mark.long
 def test_a_stow_and_its_end_in_mid_pass_on_the_simulated_acu() -> None:
     flight = climb(60.0, script=[(15.0, says("stow")), (30.0, says("unstow"))])
     begin = RISING_TAI_S
@@ -206,6 +207,7 @@ def test_a_stow_and_its_end_in_mid_pass_on_the_simulated_acu() -> None:
     assert [one["was_by"] for one in events_named(flight, "stow.ends")] == ["operator"]
 
 
+@pytest.mark.long
 def test_a_stow_of_ours_holds_through_a_lost_link_and_the_end_of_the_run_leaves_it_alone() -> None:
     flight = climb(40.0, script=[(15.0, says("stow")), (20.0, cut(True)), (22.0, cut(False))])
     assert flight.rows[-1].mode in (AcuMode.STOWING, AcuMode.STOWED)

@@ -76,6 +76,7 @@ def test_a_keep_out_on_a_pass_is_told_with_its_times() -> None:
     assert sorted(seen.az_deg.tolist()) == pytest.approx([60.0, 80.0], abs=0.5)
 
 
+@pytest.mark.long
 def test_with_avoid_the_beam_is_never_inside_and_the_satellite_is_tracked_before_and_after() -> None:
     flight = flown("avoid", 40.0)
     assert min(from_the_sun_deg(flight)) > RADIUS_DEG
@@ -91,6 +92,7 @@ def test_with_avoid_the_beam_is_never_inside_and_the_satellite_is_tracked_before
     assert not events_named(flight, "fence.refused")
 
 
+@pytest.mark.long
 def test_with_warn_it_is_told_and_followed() -> None:
     flight = flown("warn", 30.0)
     assert min(from_the_sun_deg(flight)) < 0.5

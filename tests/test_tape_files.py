@@ -337,6 +337,7 @@ async def test_a_report_that_cannot_be_made_is_told_and_ends_nothing(tmp_path: P
     assert "not made within" in late["reason"]
 
 
+@pytest.mark.long
 async def test_a_report_is_made_in_a_process_of_its_own(tmp_path: Path) -> None:
     files = Writer("files")
     kept: Any = type("Kept", (), {"path": tmp_path / f"latch{SUFFIX}"})()

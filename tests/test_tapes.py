@@ -49,6 +49,7 @@ class States:
         """Nothing to note."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", TROUBLES)
 def test_a_recording_with_a_fault_gives_every_command_again(name: str) -> None:
     seen = States()

@@ -145,6 +145,7 @@ class Spoiling(InlineFitRunner):
         return replace(reply, prediction=spoiled(reply.prediction, ("el_deg",), nan))
 
 
+@pytest.mark.long
 def test_p5_answers_of_the_fit_that_are_not_finite_are_refused_and_the_last_good_buffer_is_followed() -> None:
     target = demo_target(tracking={"horizon_s": 30.0, "low_water_s": 10.0})  # so that it would run dry
     flight = climb(60.0, target, losses=[(12.0, 58.0)], make_runner=Spoiling)

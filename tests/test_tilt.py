@@ -109,6 +109,7 @@ def test_with_5_deg_east_and_west_every_polar_pass_is_on_the_path(height_km: flo
         assert not [one for one in plan.beyond if one.axis == "elevation"]
 
 
+@pytest.mark.long
 def test_a_pass_over_the_zenith_is_autotracked_all_the_way_on_a_leaning_pedestal() -> None:
     flight = over_the_zenith(tilting(500, 89.9), before_s=35.0, after_s=20.0)
     assert lost_s(flight) == 0.0
@@ -124,6 +125,7 @@ def test_a_loss_is_held_on_a_leaning_pedestal_whose_encoders_are_biased() -> Non
     assert errors_deg(flight, 0.0, 28.0).max() < 0.2
 
 
+@pytest.mark.long
 def test_the_antenna_sets_out_so_early_that_the_tilt_is_set_and_acquires_only_then() -> None:
     target = tilting(500, 89.9)
     coming, wanted = coming_pass(target, TOP_TAI_S - 900.0), tilt_of(target).angle_deg

@@ -69,6 +69,7 @@ def test_a_wrong_lock_gives_way_after_three_times_its_length_sooner_or_later_by_
     assert needed <= after_s <= needed + EVERY_S
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("wrong_s", "off", "rise_db", "needed"), [(32, EARLY, 0.0, MOST_S)])
 def test_a_wrong_lock_however_long_gives_way_after_75_s(
     wrong_s: int, off: Correction, rise_db: float, needed: float
@@ -87,6 +88,7 @@ def test_a_wrong_lock_on_an_unlikely_orbit_gives_way_at_once_only_where_nobody_k
     assert needed <= after_s <= needed + EVERY_S
 
 
+@pytest.mark.long
 def test_a_wrong_lock_that_a_daemon_started_again_has_gone_on_from_goes_whole_when_it_gives_way() -> None:
     tai_s = visible(SOURCE, WHERE, 1.0)[60:100]
     wrong, own = look_at(SOURCE.corrected(UNLIKELY), tai_s, WHERE), look_at(SOURCE, tai_s, WHERE)

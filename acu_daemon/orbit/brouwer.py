@@ -5,6 +5,7 @@ revolution; the slow (long-period) motion of the eccentricity vector by J3 is no
 Source: Brouwer, Solution of the problem of artificial satellite theory without drag, AJ 64 (1959) 378.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, sqrt
 
@@ -107,32 +108,44 @@ class BrouwerPropagator:
         self.short_period = short_period
         self.correction = correction or Correction()
         self.epoch_tai_s = elements.epoch_tai_s
-        self._start = start = _corrected(elements, self.correction)
+        start = _corrected(elements, self.correction)
         if not (0.0 <= start.e < 1.0 and start.a_m > 0.0):
             raise OrbitError(f"{elements.name}: not an ellipse: a = {start.a_m} m, e = {start.e}")
-        self._rates = secular_rates(start.a_m, start.e, start.i_rad)
+        rates = secular_rates(start.a_m, start.e, start.i_rad)
+        self._start = (start.a_m, start.e, start.i_rad, start.raan_rad, start.argp_rad, start.mean_anomaly_rad)
+        self._rates = (0.0, 0.0, 0.0, rates.raan_rad_s, rates.argp_rad_s, rates.mean_anomaly_rad_s)
 
     def states_teme(self, tai_s: Array) -> tuple[Array, Array]:
         """Positions (N, 3) in metres and velocities (N, 3) in m/s, TEME of date, at the times (N,).
 
         Raises:  OrbitError: a time that is not finite.
         """
+        self._refuse_infinite(tai_s)
+        return states_of_mean(self.mean_elements(tai_s), self.short_period)
+
+    def _refuse_infinite(self, tai_s: Array) -> None:
         if not np.isfinite(tai_s).all():
             raise OrbitError(f"{self.elements.name}: no position at a time that is not finite")
-        return states_of_mean(self.mean_elements(tai_s), self.short_period)
+
+    def states_together(self, corrections: Sequence[Correction], tai_s: Array) -> tuple[Array, Array]:
+        """Positions and velocities (M, N, 3) with each of the M corrections, like `states_teme`.
+
+        Raises:  OrbitError: a time that is not finite, or a correction that leaves no elliptic orbit.
+        """
+        self._refuse_infinite(tai_s)
+        mean = self._mean_of([self.corrected(one) for one in corrections], tai_s)
+        r_m, v_m_s = states_of_mean(mean, self.short_period)
+        return r_m.reshape(-1, tai_s.size, 3), v_m_s.reshape(-1, tai_s.size, 3)
 
     def mean_elements(self, tai_s: Array) -> OsculatingElements:
         """The mean elements with their secular motion at the times (N,)."""
-        elapsed_s = tai_s - self.epoch_tai_s
-        start, one = self._start, np.ones_like(elapsed_s)
-        return OsculatingElements(
-            a_m=start.a_m * one,
-            e=start.e * one,
-            i_rad=start.i_rad * one,
-            raan_rad=start.raan_rad + self._rates.raan_rad_s * elapsed_s,
-            argp_rad=start.argp_rad + self._rates.argp_rad_s * elapsed_s,
-            mean_anomaly_rad=start.mean_anomaly_rad + self._rates.mean_anomaly_rad_s * elapsed_s,
-        )
+        return self._mean_of([self], tai_s)
+
+    def _mean_of(self, sources: "Sequence[BrouwerPropagator]", tai_s: Array) -> OsculatingElements:
+        """The mean elements of M sources of this epoch at the times (N,), one source after the other, (M N,)."""
+        starts = np.array([one._start for one in sources]).T[:, :, None]
+        rates = np.array([one._rates for one in sources]).T[:, :, None]
+        return OsculatingElements(*(starts + rates * (tai_s - self.epoch_tai_s)).reshape(6, -1))
 
     def corrected(self, correction: Correction) -> "BrouwerPropagator":
         """The same elements with this correction in place of any earlier one."""

@@ -41,7 +41,7 @@ def solve_kepler(mean_anomaly_rad: Array, e: Array) -> Array:
     for _ in range(_MAX_NEWTON_STEPS):
         step = (anomaly - e * np.sin(anomaly) - target) / (1.0 - e * np.cos(anomaly))
         anomaly = anomaly - step
-        if np.max(np.abs(step), initial=0.0) < _CONVERGED_RAD:
+        if not (np.abs(step) >= _CONVERGED_RAD).any():
             break
     result: Array = mean_anomaly_rad + (np.copysign(anomaly, m) - m)
     return result
@@ -65,8 +65,9 @@ def perifocal_axes(i_rad: Array, raan_rad: Array, angle_rad: Array) -> tuple[Arr
     ci, si = np.cos(i_rad), np.sin(i_rad)
     co, so = np.cos(raan_rad), np.sin(raan_rad)
     cw, sw = np.cos(angle_rad), np.sin(angle_rad)
-    p_axis = np.stack([cw * co - sw * ci * so, cw * so + sw * ci * co, sw * si], axis=-1)
-    q_axis = np.stack([-sw * co - cw * ci * so, -sw * so + cw * ci * co, cw * si], axis=-1)
+    p_axis, q_axis = np.empty((2, *cw.shape, 3))
+    p_axis[..., 0], p_axis[..., 1], p_axis[..., 2] = cw * co - sw * ci * so, cw * so + sw * ci * co, sw * si
+    q_axis[..., 0], q_axis[..., 1], q_axis[..., 2] = -sw * co - cw * ci * so, -sw * so + cw * ci * co, cw * si
     return p_axis, q_axis
 
 

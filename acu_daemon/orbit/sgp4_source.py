@@ -1,11 +1,12 @@
 """SGP4/SDP4 through the sgp4 package, with the WGS72 constants element sets are made with."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 from math import isfinite, pi
 from typing import Any
 
 import numpy as np
-from sgp4.api import SGP4_ERRORS, WGS72, Satrec
+from sgp4.api import SGP4_ERRORS, WGS72, Satrec, SatrecArray
 
 from acu_daemon.errors import OrbitError
 from acu_daemon.model import Correction
@@ -61,16 +62,31 @@ class Sgp4Propagator:
         Raises:  OrbitError: SGP4 has no answer for one of the times, or none that is believed; names satellite, the
                  first such time and why.
         """
-        if tai_s.size and not (self._first_tai_s <= tai_s.min() and tai_s.max() <= self._last_tai_s):
-            raise OrbitError(self._disbelief(tai_s))
-        day = np.full(tai_s.shape, self._satrec.jdsatepoch)
-        fraction = self._satrec.jdsatepochF + (tai_s - self.epoch_tai_s) / DAY_S
-        codes, r_km, v_km_s = self._satrec.sgp4_array(day, fraction)
+        codes, r_km, v_km_s = self._satrec.sgp4_array(*self._days(tai_s))
         if codes.any() or not np.isfinite(r_km).all():
             bad = int(np.argmax((codes != 0) | ~np.isfinite(r_km).all(axis=1)))
             reason = _reason(int(codes[bad])) if codes[bad] else "the position is not finite"
             raise OrbitError(_refusal(self, float(tai_s[bad]), reason))
         return r_km * 1e3, v_km_s * 1e3
+
+    def states_together(self, corrections: Sequence[Correction], tai_s: Array) -> tuple[Array, Array]:
+        """Positions and velocities (M, N, 3) with each of the M corrections, like `states_teme`.
+
+        Raises:  OrbitError: as `states_teme` does.
+        """
+        satrecs = SatrecArray([_satrec(self.elements, one) for one in corrections])
+        codes, r_km, v_km_s = satrecs.sgp4(*self._days(tai_s))
+        if codes.any() or not np.isfinite(r_km).all():
+            for one in corrections:
+                self.corrected(one).states_teme(tai_s)  # says which time it was, and why
+        return r_km * 1e3, v_km_s * 1e3
+
+    def _days(self, tai_s: Array) -> tuple[Array, Array]:
+        """Julian days of the times (N,), and their fractions.  OrbitError: what is not believed."""
+        if tai_s.size and not (self._first_tai_s <= tai_s.min() and tai_s.max() <= self._last_tai_s):
+            raise OrbitError(self._disbelief(tai_s))
+        day = np.full(tai_s.shape, self._satrec.jdsatepoch)
+        return day, self._satrec.jdsatepochF + (tai_s - self.epoch_tai_s) / DAY_S
 
     def _disbelief(self, tai_s: Array) -> str:
         """What is said of times outside what is believed, or not finite."""

@@ -17,7 +17,7 @@ from acu_daemon.assist.estimators.full.estimated_states import (
 )
 from acu_daemon.model import Site
 from acu_daemon.orbit.frames import enu_from_itrs, itrs_from_teme, station_itrs_m
-from acu_daemon.orbit.propagator import Propagator
+from acu_daemon.orbit.propagator import Propagator, states_together
 from acu_daemon.pointing.mount import axes_on_the_sky
 from acu_daemon.units import DEG, EARTH_EQUATORIAL_RADIUS_M, Array
 
@@ -89,13 +89,11 @@ def orbit_partials_itrs(source: Propagator, x: Array, site: Site, node_tai_s: Ar
 
     One-sided: the steps are so small that the curvature is a 1e-5th, which only the direction of a sweep sees.
     """
-    r_m, v_m_s = np.empty((2, ORBIT_COUNT + 1, node_tai_s.size, 3))
-    r_m[-1], v_m_s[-1] = source.corrected(correction_of(x)).states_teme(node_tai_s)
-    for k, step in enumerate(STEPS):
-        moved = x.copy()
-        moved[k] += step
-        r1_m, v1_m_s = source.corrected(correction_of(moved)).states_teme(node_tai_s)
-        r_m[k], v_m_s[k] = (r1_m - r_m[-1]) / step, (v1_m_s - v_m_s[-1]) / step
+    moved = np.tile(x, (ORBIT_COUNT + 1, 1))
+    moved[range(ORBIT_COUNT), range(ORBIT_COUNT)] += STEPS
+    r_m, v_m_s = states_together(source, [correction_of(one) for one in moved], node_tai_s)
+    steps = np.array(STEPS)[:, None, None]
+    r_m[:-1], v_m_s[:-1] = (r_m[:-1] - r_m[-1]) / steps, (v_m_s[:-1] - v_m_s[-1]) / steps
     times = np.tile(node_tai_s, ORBIT_COUNT + 1)
     turned = itrs_from_teme(r_m.reshape(-1, 3), v_m_s.reshape(-1, 3), times, site.orientation)  # linear in both
     value, rate = (one.reshape(ORBIT_COUNT + 1, -1, 3).swapaxes(1, 2) for one in turned)
