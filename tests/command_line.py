@@ -23,6 +23,7 @@ def acu_daemon(*arguments: object) -> Done:
     code = 0
     with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         patch.setattr(sys, "argv", ["acu-daemon", *map(str, arguments)])
+        patch.setattr(sys.modules["__main__"], "__package__", "")  # whatever pytest was started by: help names it
         try:
             main()
         except SystemExit as end:
