@@ -60,6 +60,15 @@ def test_a_value_at_a_bound_is_within_it() -> None:
     assert buckets.total == pytest.approx(100.0 + 2.0 * STEP)
 
 
+def test_the_bounds_of_each_distribution_are_those_that_dashboards_are_drawn_for() -> None:
+    tally = Tally()
+    tenths_ms = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
+    assert tally.lateness.bounds == pytest.approx([1e-4 * one for one in tenths_ms])
+    assert tally.round_trip.bounds == (0.005, 0.01, 0.02, 0.03, 0.05, 0.075, 0.1, 0.2, 0.5)
+    assert tally.write_gap.bounds == (0.1, 0.11, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0)
+    assert tally.relock.bounds == (0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0)
+
+
 @pytest.mark.parametrize("cause", [*LOSSES, Cause.PASS_NEAR])
 def test_a_loss_is_counted_under_its_cause(cause: Cause) -> None:
     tally = told(changed(S.AUTOTRACK_FITTED, S.HOLD_FITTED, cause))

@@ -180,6 +180,17 @@ def test_a_short_band_is_seen_and_one_without_a_label_has_none() -> None:
     assert 'width="1.0" height="142"></rect>' in drawn
 
 
+def test_without_a_curve_the_axes_go_from_zero_to_one() -> None:
+    drawn = chart("t", "deg", [])
+    frame = ChartFrame(0.0, 1.0, -0.06, 1.06, 190.0)
+    assert [(text, y) for _, y, text in labels(drawn, "end")] == [
+        (text, pytest.approx(frame.y(float(text)) + 4.0, abs=0.06)) for text in ("0", "0.25", "0.5", "0.75", "1")
+    ]
+    assert 'class="line' not in drawn
+    marked = chart("t", "deg", [], marks=[(0.5, "m")])
+    assert [text for _, _, text in labels(marked, "end")][-1] == "m"
+
+
 def test_title_and_unit_are_words_and_not_marks_of_the_page() -> None:
     drawn = chart("<t>", "<deg>", [curve([0.0, 1.0], [1.0, 2.0])])
     assert "<title>&lt;t&gt;</title>" in drawn
@@ -205,6 +216,7 @@ def test_values_are_written_left_of_their_lines() -> None:
     [
         (0.0, 600.0, 0.0, 0.0, 60.0, ["00:00", "00:01", "00:02", "00:03"]),
         (0.0, 600.0, 3600.0 * 13 + 90.0, 30.0, 60.0, ["13:02", "13:03"]),
+        (6000.0, 6600.0, 0.0, 6000.0, 60.0, ["01:40", "01:41"]),
         (0.0, 840.0, 0.0, 0.0, 60.0, ["00:00", "00:01"]),
         (0.0, 841.0, 0.0, 0.0, 120.0, ["00:00", "00:02"]),
         (-100.0, 100.0, 86400.0, -90.0, 15.0, ["23:58:30", "23:58:45", "23:59:00"]),
