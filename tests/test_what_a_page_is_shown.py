@@ -17,7 +17,7 @@ from acu_daemon.daemon.drawing import Aim, Backdrop, PathAhead
 from acu_daemon.daemon.operator_verbs import VERBS
 from acu_daemon.daemon.write_lease import WriteLease
 from acu_daemon.units import Array
-from acu_daemon.web.feed import Feed, Topic, alarms_shown, to_json
+from acu_daemon.web.feed import MOST_SHARED, Feed, Topic, alarms_shown, to_json
 from acu_daemon.web.guard import LEAST_TOKEN, Allowance, Seals, host_name, is_our_host, is_our_origin, seal_of
 from acu_daemon.web.order_desk import OrderDesk, Person, line_of, verbs_shown
 from acu_daemon.web.pass_story import STATE_COUNT, STRIP_COUNT, PassStory, strip_row
@@ -203,6 +203,7 @@ def test_what_is_shared_is_right_for_each_who_asks_though_many_ask() -> None:
         side.feed.see(replace(SEEN, az_deg=float(number)))
         assert side.all()["now"]["az_deg"] == number
         assert side.all()["now"]["az_deg"] == number
+        assert len(side.feed._shared) <= MOST_SHARED
 
 
 def test_while_nobody_looks_nothing_is_made_but_alarms_and_states_are_kept() -> None:
@@ -447,6 +448,17 @@ def test_each_stop_is_obeyed_and_after_twenty_at_once_the_line_is_cut() -> None:
     desk.now_s += 60.0
     desk.desk.stop(person)
     assert person.is_barred
+
+
+def test_five_stops_a_second_are_what_a_hand_can_press() -> None:
+    desk = Desk()
+    person = Person("peer", Seals(None, "n"))
+    for _ in range(20):
+        desk.desk.stop(person)
+    desk.now_s += 1.0
+    for number in range(6):
+        desk.desk.stop(person)
+        assert person.is_barred == (number == 5)
 
 
 def test_ten_wrong_seals_of_all_together_and_then_one_in_ten_seconds() -> None:
