@@ -27,7 +27,7 @@ from acu_daemon.control.with_parts import with_parts
 from acu_daemon.daemon.drawing import OWN_DEG, ROW_COUNT, ROW_POINTS, TRACK_COUNT, take_ahead, take_aim, take_track
 from acu_daemon.daemon.envelope_watch import look_around
 from acu_daemon.daemon.tally import RunFigures, Tally
-from acu_daemon.model import Model, Reading
+from acu_daemon.model import AxisLimits, Model, Reading
 from acu_daemon.outlets.metric_families import Surroundings
 from acu_daemon.outlets.metrics_server import render
 from acu_daemon.pointing.keep_out import KeepOut
@@ -221,6 +221,35 @@ def test_the_angle_to_the_sun_is_shown_where_anybody_cares_and_its_coming_where_
     assert (warned.sun_reach_s, warned.way_out, warned.alarm) == (None, None, "")
     bare = ControlConfig(replace(BY_SUN, sun=None, keep_outs=(KeepOut("mast", 10.0, 20.0),)))
     assert look_around(inside, MORNING, bare).sun_deg is None
+
+
+def test_an_alarm_of_the_sun_comes_in_the_time_that_people_need_and_tells_the_way_out() -> None:
+    envelope = replace(BY_SUN, elevation=AxisLimits(0.0, 90.0, 5.0, 5.0))
+    az_deg, el_deg = SUN.direction_deg(MORNING + 3000.0)
+    state = remembering(status=AcuStatus(az_deg % 360.0, el_deg, AcuMode.REMOTE), az_deg=az_deg, by_people=False)
+    reach_s = look_around(state, MORNING, ControlConfig(envelope)).sun_reach_s
+    assert reach_s is not None
+    assert 700.0 < reach_s < 3000.0
+    for response_time_s, is_told in ((reach_s - 1.0, False), (reach_s, True), (reach_s + 1.0, True)):
+        seen = look_around(state, MORNING, ControlConfig(envelope, response_time_s=response_time_s))
+        assert (seen.way_out is not None) == is_told
+        said = f"the sun reaches its keep-out in {reach_s:.0f} s, and the daemon does not move it: it is not armed; "
+        way = f"the way out is az {seen.way_out[0]:.1f} el {seen.way_out[1]:.1f}" if seen.way_out else ""
+        assert seen.alarm == (f"{said}{way}" if is_told else "")
+    near = look_around(state, MORNING + reach_s - 599.0, ControlConfig(envelope, response_time_s=1.0))
+    assert (near.way_out is not None, near.alarm) == (True, "")
+    early = look_around(state, MORNING + reach_s - 603.0, ControlConfig(envelope, response_time_s=1.0))
+    assert early.way_out is None
+    inside = look_around(state, MORNING + 3000.0, ControlConfig(envelope))
+    assert inside.alarm.startswith(
+        "the antenna is within the sun's, and the daemon does not move it: it is not armed; "
+    )
+    shut = replace(
+        envelope,
+        azimuth=AxisLimits(az_deg - 1.0, az_deg + 1.0, 20.0, 10.0),
+        elevation=AxisLimits(el_deg - 1.0, el_deg + 1.0, 5.0, 5.0),
+    )
+    assert look_around(state, MORNING + 3000.0, ControlConfig(shut)).alarm.endswith("; there is no way out")
 
 
 def test_the_sun_is_drawn_where_it_is_in_the_middle_of_each_pass(
