@@ -10,11 +10,14 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from acu_daemon.assist.mount_memory.mount_fit import FittedPass
+from acu_daemon.edge.mount_memory_file import PassRow
 from acu_daemon.model import AxisLimits
 from acu_daemon.pointing.envelope import Envelope
 from acu_daemon.pointing.keep_out import KeepOut
 from acu_daemon.pointing.skyline import Skyline
 from acu_daemon.report import pass_plan_plot, plot, sky_plot
+from acu_daemon.report.mount_text import plot_drift, plot_residuals
 from acu_daemon.report.pass_plan_plot import LIMIT, SUN, PlannedPicture, plot_plan
 from acu_daemon.report.pass_trace import Figures, Trace, figures_table, measure, until
 from acu_daemon.report.plot import FLOOR_DEG, plot_passes
@@ -251,6 +254,42 @@ def test_a_zone_all_around_is_a_whole_turn() -> None:
     axes = drawn_sky(Envelope(AZIMUTH, ELEVATION, keep_outs=(KeepOut("low", 0.0, 0.0, -90.0, 8.0),)))
     low, high, bottom, top = reach(axes.collections[1])
     assert (high - low, bottom, top) == pytest.approx((360.0, -5.0, 8.0))
+
+
+# The memory of the mount
+
+
+def test_the_drift_of_both_zero_points_is_drawn_over_time_with_its_sigmas(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("matplotlib.figure.Figure", Kept)
+    rows = [PassRow(f"2026-08-0{k}T12:00:00Z", "S", 0.1 * k, -0.2 * k, 0.01, 0.03) for k in (1, 2, 3)]
+    plot_drift(WHERE, rows, "title")
+    azimuth, elevation = Kept.newest.get_axes()
+    for axes, name, values, sigma in (
+        (azimuth, "IA", [0.1, 0.2, 0.3], 0.01),
+        (elevation, "IE", [-0.2, -0.4, -0.6], 0.03),
+    ):
+        assert axes.get_ylabel() == f"{name}, deg"
+        line = axes.get_lines()[0]
+        assert np.asarray(line.get_ydata()).tolist() == pytest.approx(values)
+        assert np.diff(np.asarray(axes.convert_xunits(line.get_xdata()))).tolist() == [1.0, 1.0]
+        bars = axes.collections[0].get_segments()
+        assert [float(np.ptp(bar[:, 1])) for bar in bars] == pytest.approx([2.0 * sigma] * 3)
+
+
+def test_what_is_left_is_drawn_over_both_angles_before_and_after(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("matplotlib.figure.Figure", Kept)
+    before, after = np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([[0.1, 0.2], [0.3, 0.4]])
+    fitted = [FittedPass(f"{k}", "", np.array([k, 20.0]), np.array([30.0, k]), k * before, k * after) for k in (1, 2)]
+    plot_residuals(WHERE, fitted, "title")
+    across_az, across_el, up_az, up_el = Kept.newest.get_axes()
+    for axes, at, row in (
+        *((across_az, [1.0, 20.0, 2.0, 20.0], 0), (across_el, [30.0, 1.0, 30.0, 2.0], 0)),
+        *((up_az, [1.0, 20.0, 2.0, 20.0], 1), (up_el, [30.0, 1.0, 30.0, 2.0], 1)),
+    ):
+        for label, left in (("before", before), ("after", after)):
+            assert lines(axes, label) == [(at, pytest.approx([*left[row], *(2.0 * left[row])]))]
+    assert (across_az.get_ylabel(), up_az.get_ylabel()) == ("across, deg", "elevation, deg")
+    assert (up_az.get_xlabel(), up_el.get_xlabel()) == ("azimuth, deg", "elevation, deg")
 
 
 # A simulated pass
