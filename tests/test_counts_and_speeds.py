@@ -217,6 +217,13 @@ def test_seconds_end_with_their_beginning() -> None:
     assert Motion().speed_deg_s(NOW) is None
 
 
+def test_two_seconds_of_readings_are_held_and_no_more() -> None:
+    motion = Motion()
+    for k in range(100):
+        motion.add(Reading(NOW + 0.25 * k, 10.0, 20.0, True))
+    assert [NOW + 0.25 * 99 - one.tai_s for one in motion._readings] == [0.25 * k for k in range(7, -1, -1)]
+
+
 # The line
 
 
