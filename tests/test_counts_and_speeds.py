@@ -186,7 +186,7 @@ def moving(
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize("az_deg", [359.5, 0.5, 180.0])
+@pytest.mark.parametrize("az_deg", [359.5, 0.5, 87.0, 93.0, 180.0])
 def test_a_speed_is_on_the_sky_over_north_and_to_both_sides(sign: float, az_deg: float) -> None:
     now = NOW + 2.9
     assert moving(2.0 * sign, az_deg=az_deg).speed_deg_s(now) == pytest.approx(1.0)
@@ -215,6 +215,16 @@ def test_seconds_end_with_their_beginning() -> None:
     assert motion.speed_deg_s(NOW + 2.0) == pytest.approx(10.0 / (middle_new - middle_old))
     assert motion.speed_deg_s(NOW + 3.0) is None
     assert Motion().speed_deg_s(NOW) is None
+
+
+def test_a_reading_that_is_two_seconds_old_is_of_no_half() -> None:
+    speeds = []
+    for el_deg in (20.0, 80.0):
+        motion = Motion()
+        for k in range(1, 9):
+            motion.add(Reading(NOW + 0.25 * k, 10.0, el_deg if k == 1 else 20.0 + 0.25 * k, True))
+        speeds.append(motion.speed_deg_s(NOW + 2.25))
+    assert speeds == [pytest.approx(1.0), pytest.approx(1.0)]
 
 
 def test_two_seconds_of_readings_are_held_and_no_more() -> None:

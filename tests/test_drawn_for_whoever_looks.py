@@ -63,6 +63,10 @@ def test_what_is_drawn_is_beside_the_path_itself_and_not_beside_a_way_that_follo
     assert aim.path_deg == pytest.approx((AZ_DEG, EL_DEG))
     assert aim.beside_deg == pytest.approx((0.0, 0.0), abs=1e-9)
     assert aim.command_beside_deg == pytest.approx((COS, 0.0))
+    without = take_aim(state, Sky(), NOW, CONFIG)
+    assert (without.path_deg, without.beside_deg, without.command_beside_deg) == (None, None, None)
+    unread = take_aim(remembering(in_force=written), Sky(prediction=followed), NOW, CONFIG)
+    assert (unread.beside_deg, unread.command_beside_deg) == (None, pytest.approx((COS, 0.0)))
 
 
 def test_of_many_searched_rows_those_nearest_to_the_path_are_drawn() -> None:

@@ -240,3 +240,15 @@ def test_autotrack_without_the_signal_is_no_relock() -> None:
     acquired[100:175] = 0.0
     sky = replace(steady(), is_on_air=is_on_air, is_acquired=acquired, error_deg=np.full(COUNT, 0.1))
     assert measure_losses(sky, AZIMUTH, ELEVATION).relock_s == pytest.approx(2.5, abs=1e-6)
+
+
+def test_a_loss_that_lasts_until_the_satellite_sets_has_no_relock_to_wait_for() -> None:
+    is_on_air, acquired = np.ones(COUNT), np.ones(COUNT)
+    is_on_air[380:], acquired[380:] = 0.0, 0.0
+    mode = ["AUTOTRACK"] * 380 + ["REMOTE_BACKUP"] * (COUNT - 380)
+    sky = replace(steady(), is_on_air=is_on_air, is_acquired=acquired, mode=mode, error_deg=np.full(COUNT, 0.1))
+    assert measure_losses(sky, AZIMUTH, ELEVATION).relock_s == 0.0
+    sky.sat_az_deg[390:] = np.nan
+    figures = measure_losses(sky, AZIMUTH, ELEVATION)
+    assert figures.relock_s == 0.0
+    assert figures.loss_s == pytest.approx(1.0)
