@@ -9,7 +9,18 @@ from test_live_line import SEEN
 
 from acu_daemon import __version__
 from acu_daemon.outlets.mqtt_messages import BINARY_SENSORS, OFFLINE, ONLINE, SENSORS, Topics, discovery
-from acu_daemon.outlets.rotctld_lines import Command, RotctlVerb, dumped_state, reply_of, understood_line
+from acu_daemon.outlets.rotctld_lines import (
+    INVALID,
+    IO_ERROR,
+    NOT_IMPLEMENTED,
+    OK,
+    REJECTED,
+    Command,
+    RotctlVerb,
+    dumped_state,
+    reply_of,
+    understood_line,
+)
 
 V = RotctlVerb
 TOPICS = Topics("site/a dish/1", "The dish")
@@ -95,6 +106,10 @@ def test_an_answer_is_values_or_a_number_and_both_in_the_extended_form(
     assert reply_of(command, code, values) == said
 
 
+def test_errors_have_hamlibs_numbers() -> None:
+    assert (OK, INVALID, NOT_IMPLEMENTED, IO_ERROR, REJECTED) == (0, -1, -4, -6, -9)
+
+
 def test_a_dumped_state_has_each_limit_in_its_place() -> None:
     assert dumped_state((-270.5, 271.0), (-1.0, 92.0)) == (
         b"1\n2\nmin_az=-270.500000\nmax_az=271.000000\nmin_el=-1.000000\nmax_el=92.000000\n"
@@ -165,6 +180,8 @@ def test_every_sensor_has_the_unit_of_its_key() -> None:
         unit = next((unit for end, unit in units.items() if key.endswith(end)), None)
         assert more.get("unit_of_measurement") == unit, key
         assert (more.get("device_class") == "timestamp") == key.endswith("_utc"), key
+    digits = {key: more["suggested_display_precision"] for key, _, more in SENSORS if key.endswith("_deg")}
+    assert digits == {"az_deg": 2, "el_deg": 2, "off_path_deg": 3}
     names = {key: name for key, name, _ in SENSORS} | {key: name for key, name, *_ in BINARY_SENSORS}
     assert names == {
         "verdict": "Verdict",
