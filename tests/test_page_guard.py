@@ -106,7 +106,8 @@ def test_an_order_without_a_number_is_refused(order: object) -> None:
 def test_a_wrong_seal_and_what_is_no_text_are_refused() -> None:
     seals = Seals(TOKEN, "n")
     assert seals.open(*sealed({"n": 1}, token=b"another token 16")) == (None, "the token is wrong")
-    assert seals.open(None, None)[0] is None
+    for order, seal in ((None, None), (None, "0"), ("{}", None), (b"{}", "0"), ("{}", b"0")):
+        assert seals.open(order, seal) == (None, "an order and its seal are texts")
     assert seals.open("{}", "\udc80\u00e9")[0] is None
     assert seals.open('{"n":1,"x":"\ud800"}', "0") == (None, "the token is wrong")
     assert seals.open("no json", seal_of(TOKEN, "n", "no json")) == (None, "the order is no JSON")

@@ -145,3 +145,21 @@ def test_a_pass_without_a_rise_and_words_of_others_are_shown_as_they_are() -> No
     assert "&lt;b&gt;" in page
     assert "&lt;i&gt;" in page
     assert 'href="a&quot;b.html"></a>' in page
+
+
+def test_names_are_words_and_not_marks_of_the_page() -> None:
+    made = report(**{"pass": {"satellite": "<b>A&B", "station": "<i>S"}})
+    page = index_page(index_figures([('x"y', made)]))
+    assert "&lt;b&gt;A&amp;B" in page
+    assert "<h1>Passes of &lt;i&gt;S</h1>" in page
+    assert 'href="x&quot;y.html"' in page
+    assert "<b>A" not in page
+    assert "<i>" not in page
+
+
+def test_a_pass_that_rises_just_after_midnight_is_after_one_of_the_day_before() -> None:
+    times = ("2026-08-19T00:00:01Z", "2026-08-18T23:59:59Z", "2025-12-31T12:00:00Z")
+    made = [(name, report(plan={"rise_utc": utc})) for name, utc in zip("abc", times, strict=True)]
+    assert [row["name"] for row in index_figures(made)["passes"]] == ["c", "b", "a"]
+    without = report(plan=None, outcome={"begun_utc": "2026-08-19T00:00:00Z"})
+    assert [row["name"] for row in index_figures([*made, ("d", without)])["passes"]] == ["c", "b", "d", "a"]

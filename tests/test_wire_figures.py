@@ -148,3 +148,107 @@ def test_a_pass_without_a_signal_or_without_a_loss_is_said_so() -> None:
         measure_losses(replace(steady(), is_acquired=np.zeros(COUNT)), AZIMUTH, ELEVATION)
     with pytest.raises(ValueError, match="no loss"):
         measure_losses(steady(), AZIMUTH, ELEVATION)
+
+
+def followed(*moves_deg: tuple[float, float], gap_s: float = 0.1, flags: tuple[int, ...] = ()) -> float:
+    """The share of the rate that followed writes take, which move from one to the next by so much."""
+    path = np.cumsum(np.array([(0.0, 0.0), *moves_deg]), axis=0)
+    tai_s = START_TAI_S + np.concatenate(([0.0], 100.0 + gap_s * np.arange(len(path) + 1)))
+    az, el = (
+        np.concatenate(([0.0, 0.0], 359.95 + path[:, 0])) % 360.0,
+        np.concatenate(([10.0, 10.0], 10.0 + path[:, 1])),
+    )
+    is_followed = np.array([0, 0, *(flags or [1] * len(path))])
+    writes = Writes(tai_s, az, el, ["AUTOTRACK"] * tai_s.size, is_followed)
+    sky = trace_of(np.zeros(3000), np.full(3000, 10.0))
+    return measure_writes(writes, sky, AZIMUTH, ELEVATION, 0.01).rate_share
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_fastest_of_both_axes_counts_to_both_sides_and_over_north(sign: float) -> None:
+    az, el = AZIMUTH.max_rate_deg_s, ELEVATION.max_rate_deg_s
+    assert followed((sign * 0.5, 0.0)) == pytest.approx(0.49 / 0.1 / az)
+    assert followed((0.0, sign * 0.5)) == pytest.approx(0.49 / 0.1 / el)
+    assert followed((0.0, 0.0), (sign * 0.3, sign * 0.4), (0.0, 0.1)) == pytest.approx(max(0.29 / az, 0.39 / el) / 0.1)
+    assert followed((0.0, sign * 0.5), gap_s=0.2) == pytest.approx(0.49 / 0.2 / el)
+    assert followed((0.0, sign * 0.5), gap_s=0.05) == pytest.approx(0.49 / 0.1 / el)  # soon after a late one
+    assert followed((0.0, 0.005)) == 0.0  # less than a step
+
+
+@pytest.mark.parametrize(("flags", "counts"), [((1, 1), True), ((1, 0), False), ((0, 1), False), ((0, 0), False)])
+def test_a_motion_is_between_two_writes_that_are_both_followed(flags: tuple[int, int], counts: bool) -> None:
+    assert (followed((5.0, 0.0), flags=flags) > 0.0) == counts
+
+
+def test_the_figures_of_two_writes_are_theirs() -> None:
+    sky = steady()
+    some = writes_of(sky)
+    k = [150, 151]
+    two = Writes(some.tai_s[k], some.az_deg[k], some.el_deg[k] + 0.5, ["REMOTE", "AUTOTRACK"], np.zeros(2))
+    with pytest.raises(ValueError, match="too few"):
+        measure_writes(two, sky, AZIMUTH, ELEVATION, LSB_DEG)
+    k = [150, 151, 260]
+    three = Writes(some.tai_s[k], some.az_deg[k], some.el_deg[k], ["AUTOTRACK"] * 3, np.zeros(3))
+    three.el_deg[2] += 0.5
+    figures = measure_writes(three, sky, AZIMUTH, ELEVATION, LSB_DEG)
+    assert (figures.write_count, figures.share_of_short_gaps) == (3, 0.5)
+    assert figures.longest_gap_s == pytest.approx(10.9, abs=1e-5)
+    assert figures.autotrack_max_deg == figures.autotrack_p99_deg == pytest.approx(0.5, abs=1e-4)
+
+
+def test_writes_while_the_sky_has_no_satellite_are_not_judged() -> None:
+    sky = steady()
+    sky.sat_az_deg[300:] = np.nan
+    writes = writes_of(steady())
+    writes.az_deg[305:] += 40.0
+    assert measure_writes(writes, sky, AZIMUTH, ELEVATION, LSB_DEG).autotrack_max_deg < 1e-3
+
+
+@pytest.mark.parametrize(("az_deg", "el_deg"), [(0.0, 10.0), (359.9, 10.0), (90.0, -5.0), (200.0, 60.0)])
+def test_a_satellite_between_two_rows_is_between_them_also_over_north(az_deg: float, el_deg: float) -> None:
+    sky = trace_of(np.array([az_deg - 0.1, az_deg + 0.1]), np.array([el_deg - 0.2, el_deg + 0.2]))
+    az, el = satellite_at(sky, START_TAI_S + np.array([-0.001, 0.0, 0.05, 0.1, 0.101]))
+    assert np.isnan(az[[0, -1]]).all()
+    assert np.isnan(el[[0, -1]]).all()
+    off = (az[1:4] - az_deg + 180.0) % 360.0 - 180.0
+    assert off == pytest.approx([-0.1, 0.0, 0.1], abs=2e-3)
+    assert el[1:4] == pytest.approx([el_deg - 0.2, el_deg, el_deg + 0.2], abs=1e-3)
+    assert (az[1:4] >= 0.0).all()
+    assert (az[1:4] < 360.0).all()
+
+
+def test_losses_count_from_the_first_acquisition_on_and_the_longest_relock_is_told() -> None:
+    is_on_air, acquired = np.ones(COUNT), np.ones(COUNT)
+    acquired[:50] = 0.0
+    for begin, end in ((20, 70), (100, 110), (200, 230), (390, COUNT)):
+        is_on_air[begin:end] = 0.0
+    mode = ["AUTOTRACK"] * COUNT
+    for back, until in ((70, 73), (110, 119), (230, 232)):
+        mode[back:until] = ["REMOTE_BACKUP"] * (until - back)
+    error_deg = np.where(is_on_air == 0.0, 0.1, 5.0)
+    error_deg[20:50] = 3.0
+    sky = replace(steady(), is_on_air=is_on_air, is_acquired=acquired, mode=mode, error_deg=error_deg)
+    figures = measure_losses(sky, AZIMUTH, ELEVATION)
+    assert figures.loss_s == pytest.approx(2.0 + 1.0 + 3.0 + 1.0)
+    assert (figures.beam_error_max_deg, figures.beam_error_median_deg) == (0.1, 0.1)
+    assert figures.relock_s == pytest.approx(0.9, abs=1e-6)
+
+
+def test_autotrack_without_the_signal_is_no_relock() -> None:
+    is_on_air, acquired = np.ones(COUNT), np.ones(COUNT)
+    is_on_air[100:150] = 0.0
+    acquired[100:175] = 0.0
+    sky = replace(steady(), is_on_air=is_on_air, is_acquired=acquired, error_deg=np.full(COUNT, 0.1))
+    assert measure_losses(sky, AZIMUTH, ELEVATION).relock_s == pytest.approx(2.5, abs=1e-6)
+
+
+def test_a_loss_that_lasts_until_the_satellite_sets_has_no_relock_to_wait_for() -> None:
+    is_on_air, acquired = np.ones(COUNT), np.ones(COUNT)
+    is_on_air[380:], acquired[380:] = 0.0, 0.0
+    mode = ["AUTOTRACK"] * 380 + ["REMOTE_BACKUP"] * (COUNT - 380)
+    sky = replace(steady(), is_on_air=is_on_air, is_acquired=acquired, mode=mode, error_deg=np.full(COUNT, 0.1))
+    assert measure_losses(sky, AZIMUTH, ELEVATION).relock_s == 0.0
+    sky.sat_az_deg[390:] = np.nan
+    figures = measure_losses(sky, AZIMUTH, ELEVATION)
+    assert figures.relock_s == 0.0
+    assert figures.loss_s == pytest.approx(1.0)

@@ -111,6 +111,7 @@ def test_where_it_points_is_beside_the_path_or_on_its_way(changes: dict[str, Any
         (STEP, "prediction good for 0 s"),
         (61.4, "prediction good for 61 s"),
         (89.8 - STEP, "prediction good for 90 s"),
+        (90.0 - 0.2, "prediction good for >90 s"),
         (89.8 + STEP, "prediction good for >90 s"),
         (90.0, "prediction good for >90 s"),
     ],
