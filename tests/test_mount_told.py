@@ -64,7 +64,8 @@ def test_zero_points_that_hold_still_say_so_in_place_of_their_swing() -> None:
 
 
 @pytest.mark.parametrize(
-    ("cosine", "sine", "utc_h"), [(1.0, 0.0, 12), (0.0, 1.0, 18), (-1.0, 0.0, 0), (0.0, -1.0, 6), (1.0, -1e-9, 12)]
+    ("cosine", "sine", "utc_h"),
+    [(1.0, 0.0, 12), (0.0, 1.0, 18), (-1.0, 0.0, 0), (0.0, -1.0, 6), (1.0, -1e-9, 12), (-0.99692, 0.07846, 0)],
 )
 def test_a_swing_has_its_amplitude_and_hour_by_utc(cosine: float, sine: float, utc_h: int) -> None:
     swings_deg = (0.02 * cosine, 0.02 * sine, 0.03 * sine, 0.04 * cosine)

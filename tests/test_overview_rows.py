@@ -67,6 +67,7 @@ def test_the_verdict_says_since_when_where_it_is_known(state_s: float | None, si
         ("satellite", {}, "NOAA-20, over Cuiaba"),
         ("satellite", {"station": ""}, "NOAA-20"),
         ("satellite", {"station": "", "satellite": ""}, None),
+        ("satellite", {"satellite": ""}, "Cuiaba"),
         ("wind", {}, None),
         ("wind", {"wind": "strong wind 20 m/s"}, "strong wind 20 m/s"),
         ("paused", {}, None),
@@ -149,6 +150,8 @@ def test_the_verdict_says_since_when_where_it_is_known(state_s: float | None, si
             "acquired, by the ACU, AGC 6.0 dB, receiver 9.5 dB 0.3 s ago",
         ),
         ("signal", {"signal_age_s": 0.3, "agc_db": None, "state": "PROGRAM"}, "acquired, by a receiver 0.3 s ago"),
+        ("signal", {"signal_age_s": 0.3, "state": "PROGRAM"}, "acquired, by a receiver 0.3 s ago, AGC 6.0 dB"),
+        ("signal", {"signal_age_s": 0.3}, "acquired, by the ACU, AGC 6.0 dB, receiver heard 0.3 s ago"),
         ("signal", {"signal_db": 9.5}, "acquired, by the ACU, AGC 6.0 dB"),
         # prediction
         ("prediction", {}, "good for 61 s, 1 sigma 0.012 deg; 0.87 s early +0.031 deg across, fit 0 s old"),

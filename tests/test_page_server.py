@@ -170,6 +170,7 @@ async def test_an_alarm_is_acknowledged_by_name_and_stays() -> None:
             await live.hear()
         number = live.newest["alarms"][0]["number"]
         await live.unlock()
+        assert "unknown" in (await live.order({"do": "acknowledge", "number": True}))["text"]
         assert (await live.order({"do": "acknowledge", "number": number}))["ok"]
         while not live.newest["alarms"][0]["acknowledged_by"]:
             await live.hear()

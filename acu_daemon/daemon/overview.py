@@ -29,7 +29,7 @@ def status_rows(seen: Snapshot) -> list[tuple[str, str]]:
     """Name and text of each row, the most wanted first; rows without anything to say are left out."""
     rows = (
         ("time", seen.utc),
-        ("satellite", f"{seen.satellite}, over {seen.station}" if seen.station else seen.satellite),
+        ("satellite", ", over ".join(text for text in (seen.satellite, seen.station) if text)),
         ("pass", _pass(seen)),
         ("zenith", seen.zenith),
         ("foreseen", seen.phantom),
@@ -141,10 +141,12 @@ def _signal(seen: Snapshot) -> str:
     agc = f", AGC {seen.agc_db:.1f} dB" if seen.agc_db is not None else ""
     if not seen.is_told_of_signal:
         return "nobody tells of it"
-    beside = "" if seen.signal_db is None or seen.signal_age_s is None else f", receiver {seen.signal_db:.1f} dB"
-    beside += "" if seen.signal_age_s is None else f" {seen.signal_age_s:.1f} s ago"
+    age = f" {seen.signal_age_s:.1f} s ago" if seen.signal_age_s is not None else ""
+    level = f" {seen.signal_db:.1f} dB" if seen.signal_db is not None else ""
     lost = f" for {seen.signal_lost_s:.0f} s" if seen.signal_lost_s is not None else ""
-    who = "a receiver" if seen.state == TrackState.PROGRAM else "the ACU"
+    is_by_receiver = seen.state == TrackState.PROGRAM and seen.is_acquired
+    who = f"a receiver{'' if level else age}" if is_by_receiver else "the ACU"
+    beside = f", receiver{level or ' heard'}{age}" if age and (level or not is_by_receiver) else ""
     return f"{f'acquired, by {who}' if seen.is_acquired else f'not acquired{lost}'}{agc}{beside}"
 
 

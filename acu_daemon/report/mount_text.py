@@ -42,8 +42,8 @@ def terms_lines(memory: PedestalMemory, settings: EstimatorSettings) -> list[str
 
 def _swing_line(mean: Array, term: int) -> str:
     amplitude, share = swing_of(mean, term)
-    utc_h = (12.0 + 24.0 * share) % 24.0  # days of tai_s begin at noon
-    return f"{PEDESTAL_TERMS[term]} by day and night: +-{amplitude / DEG:.4f} deg, highest at {utc_h:.0f} h UTC"
+    utc_h = round(12.0 + 24.0 * share) % 24  # days of tai_s begin at noon
+    return f"{PEDESTAL_TERMS[term]} by day and night: +-{amplitude / DEG:.4f} deg, highest at {utc_h} h UTC"
 
 
 def pass_lines(rows: Sequence[PassRow]) -> list[str]:

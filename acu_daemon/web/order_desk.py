@@ -1,7 +1,7 @@
 """What people at a page may order, and what each order comes to: one line of the same verbs as the command line's.
 
-STOP asks for nothing: no token, no lease, no unlocking.  All else is sealed with the token, from a page that its user
-has unlocked, and that has the write lease.
+STOP asks for nothing: no token, no lease, no unlocking.  All else is sealed with the token; an alarm is acknowledged
+from a locked page too, and every other verb asks for one that its user has unlocked, and that has the write lease.
 """
 
 import math
@@ -88,7 +88,7 @@ class OrderDesk:
                 person.unlocked_until_s = -math.inf
                 self._lease.give_back(person.key)
                 return _yes("locked")
-            case "acknowledge" if isinstance(said.get("number"), int):
+            case "acknowledge" if type(said.get("number")) is int:  # true is none
                 self._acknowledge(said["number"], person.who)
                 self._log.info("alarm.acknowledged", number=said["number"], who=person.who)
                 return _yes("seen")
