@@ -68,6 +68,7 @@ def test_where_the_satellite_comes_nearer_the_two_are_nearer_too(height_m: float
 
 @pytest.mark.parametrize("station", [NORTH, SOUTH])
 def test_the_grid_is_the_three_and_five_rings_to_where_the_margin_less_its_guard_ends(station: Station) -> None:
+    assert GUARD_DEG == 0.05
     view = flight(station, count=1001)
     grid = search_grid(view, station, 2.0)
     assert grid.shape == (3 + 5 * 24, 3)
