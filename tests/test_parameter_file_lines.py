@@ -193,3 +193,16 @@ def test_a_profile_lasts_a_day_at_most(length: str, is_read: bool) -> None:
 def test_numbers_are_plain_decimals(number: str) -> None:
     given = small(AZ, EL, VALUE=number)
     assert read(given, "a.tpf").number("VALUE") == float(number)
+
+
+@pytest.mark.parametrize(
+    ("length", "is_read"), [("5.0004", True), ("4.9996", True), ("5.0006", False), ("4.9994", False)]
+)
+def test_lengths_are_rounded_to_half_a_millisecond(length: str, is_read: bool) -> None:
+    rows = [
+        piece(axis, f"05:06:{at}", long) for axis in ("AZ", "EL") for at, long in (("07.000", length), ("12.000", "5"))
+    ]
+    if is_read:
+        assert read(small(*rows, count=2), "a.tpf").profile.azimuth.length_s.tolist() == [float(length), 5.0]
+    else:
+        assert "piece 2 of AZ does not begin where the one before ends" in refusal(small(*rows, count=2))
