@@ -115,6 +115,23 @@ def test_a_branch_is_the_station_less_the_guarded_margin_over_the_sine(start: fl
     assert (bound.low_time_s, bound.high_time_s) == pytest.approx((10.0, 0.0) if end > start else (0.0, 10.0))
 
 
+@pytest.mark.parametrize(("el_deg", "low", "high"), [(91.0, 0.0, 90.0), (89.0, 90.0, 170.0)])
+def test_where_the_elevations_range_cuts_the_cone_plans_stay_inside_and_the_bound_outside(
+    el_deg: float, low: float, high: float
+) -> None:
+    task = drawn_task(np.linspace(-10.0, 10.0, 201), np.full(201, el_deg), Cone(2.0, el_min_deg=low, el_max_deg=high))
+    exact = np.degrees(np.arccos(np.cos(np.radians(2.0)) / np.cos(np.radians(1.0))))  # 1 deg out of range
+    step = 4.0 / 120.0
+    bound = least_bound(task)
+    assert bound is not None
+    assert exact < 10.0 - bound.low_deg < exact + step
+    assert exact < bound.high_deg + 10.0 < exact + step
+    [branch] = find_branches(task)
+    guarded = np.degrees(np.arccos(np.cos(np.radians(2.0 * AZIMUTH_GUARD)) / np.cos(np.radians(1.0))))
+    assert guarded - step < branch.tube.upper_deg[-1] - 10.0 <= guarded
+    assert guarded - step < 10.0 - branch.tube.lower_deg[-1] <= guarded
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_the_range_cuts_the_tube_a_guard_within_it_in_plans_and_at_its_end_in_bounds(sign: float) -> None:
     range_deg = sorted((-sign * 9.0, sign * 200.0))

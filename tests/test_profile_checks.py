@@ -245,6 +245,13 @@ def test_the_ranges_ends_bind_azimuth_too() -> None:
     assert bounds_check(Bound(3.0, 0.0, 19.0, 10.0, 50.5), asked).value == pytest.approx(0.0, abs=1e-6)
 
 
+def test_where_the_elevations_range_cuts_the_cone_the_certificate_is_of_the_outer_tube() -> None:
+    asked = drawn_task(20.0 + 3.0 * TIMES, np.full(COUNT, 91.0), Cone(2.0, el_max_deg=90.0))
+    bound = least_bound(asked)
+    assert bound is not None
+    assert bounds_check(bound, asked).value == pytest.approx(0.0, abs=1e-6)
+
+
 def test_an_unlimited_axis_has_no_limit_that_a_pass_could_meet() -> None:
     found = axis(line(-5000.0, 1000.0), UNLIMITED)
     assert all(one.is_met for one in found.values())
