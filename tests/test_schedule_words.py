@@ -325,3 +325,15 @@ def test_two_parts_of_a_pass_are_two_entries_that_keep_their_numbers() -> None:
     assert again.book == first.book
     slots: list[Slot | None] = [one.slot for one in decide([mine], rules)]
     assert all(one is not None and one.is_cut for one in slots)
+
+
+def test_of_passes_that_only_touch_it_is_the_gap_that_is_too_short() -> None:
+    told = reasons([track("A", 600.0), track("B", 0.0, priority=9)])["A"]
+    assert "slew and preparation need" in told
+    assert "both are up" not in told
+
+
+def test_a_forced_pass_beats_a_better_one_and_says_so() -> None:
+    tracks = [track("A", 0.0, priority=1), track("B", 300.0, priority=9)]
+    assert reasons(tracks, word("A", 0.0, Wish.FORCE))["A"] == "forced by a person"
+    assert reasons(tracks, word("A", 0.0, Wish.FORCE))["B"].startswith("lost to A of ")

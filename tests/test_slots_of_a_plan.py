@@ -85,6 +85,11 @@ def test_what_is_left_must_be_worth_having(free_s: float, is_worth: bool) -> Non
     assert bool(joined(track("A", 0.0, min_useful_s=100.0), free_s)) == is_worth
 
 
+@pytest.mark.parametrize(("free_s", "is_joined"), [(599.0, True), (600.0, False), (700.0, False)])
+def test_after_its_end_a_pass_is_not_joined_though_nothing_is_asked_of_it(free_s: float, is_joined: bool) -> None:
+    assert bool(joined(track("A", 0.0, min_useful_s=0.0), free_s, az_deg=10.0)) == is_joined
+
+
 def test_frozen_slots_stay_though_their_passes_are_gone_or_offered_anew() -> None:
     mine, better = track("A", 0.0, priority=1), track("B", 100.0, priority=9)
     [frozen] = slots_of(mine, (), RULES)

@@ -144,6 +144,11 @@ def test_the_newest_of_the_older_sets_decides() -> None:
         assert judgement is None or judgement.shift_m < 0.1 * 0.2 * 6.8e6
 
 
+def test_a_set_as_new_in_another_file_does_not_speak_for_it() -> None:
+    mine, twin = loaded(GIVEN / "a.tle", 1.0, shifted_rad=0.2), loaded(GIVEN / "b.tle", 1.0, shifted_rad=0.2)
+    assert _doubt(mine, [mine, twin, loaded("/far", 0.0)], NUMBER, SOURCES) is not None
+
+
 def test_doubts_are_told_of_what_is_not_used_nor_borne_out() -> None:
     doubt = Judgement(Judged.DOUBTFUL, 50e3, 1e3)
     best, other, sure, plain = loaded("/best"), loaded("/other"), loaded("/sure"), loaded("/plain")
