@@ -200,7 +200,7 @@ def test_without_a_covariance_there_is_no_sigma_and_biases_do_not_count() -> Non
     assert sigma_m(covariance) == 0.0
 
 
-READINGS = Readings(START + 100.0 + 20.0 * np.arange(11.0), np.linspace(10.0, 90.0, 11), np.full(11, 30.0))
+READINGS = Readings(START + 100.0 + 500.0 * np.arange(11.0), np.linspace(10.0, 90.0, 11), np.full(11, 30.0))
 NOT_THE_SAME = {"reading_count": 9, "rejected_count": 2, "residual_rms_deg": 0.04}
 
 
@@ -222,7 +222,7 @@ def seen(monkeypatch: pytest.MonkeyPatch, found: Any, azimuth_deg: float = 0.02,
     told = seen_pass(setup, READINGS)
     [request] = asked
     assert request.readings is READINGS
-    assert (request.start_tai_s, request.now_tai_s, request.near_az_deg) == (START + 300.0, START + 300.0, 180.0)
+    assert (request.start_tai_s, request.now_tai_s, request.near_az_deg) == (START + 5100.0, START + 5100.0, 180.0)
     return told
 
 
@@ -259,7 +259,7 @@ def test_a_seen_pass_has_the_node_nearest_to_its_middle_by_the_corrected_orbit(m
     moved = Correction(0.01, 0.02, 1e-8, 0.0, 0.0, 0.001)
     told = seen(monkeypatch, fit(SURE, moved, **NOT_THE_SAME))
     assert isinstance(told, SeenPass)
-    crossing = crossing_near(source(moved), START + 200.0, 6017.0)
+    crossing = crossing_near(source(moved), START + 2600.0, 6017.0)
     assert told.crossing.tai_s == pytest.approx(crossing.tai_s, abs=1e-3)
     assert told.crossing.longitude_rad == pytest.approx(crossing.longitude_rad, abs=1e-9)
     assert told.sigma_m == pytest.approx(EARTH_EQUATORIAL_RADIUS_M * 1e-5, rel=1e-3)
