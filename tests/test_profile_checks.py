@@ -85,6 +85,12 @@ def test_the_range_is_told_by_the_end_that_is_nearest(
         assert found.detail == " (-10.00 to 20.00)"
 
 
+@pytest.mark.parametrize(("at", "edge", "is_met"), [(81.0, 80.0, True), (99.0, 100.0, True), (101.0, 100.0, False)])
+def test_an_axis_at_rest_is_told_the_limit_that_is_nearest(at: float, edge: float, is_met: bool) -> None:
+    found = axis(line(at, 0.0), AxisLimits(80.0, 100.0, 9.0, 9.0))["range"]
+    assert (found.value, found.limit, found.is_met) == (at, edge, is_met)
+
+
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_rate_and_acceleration_have_limits_of_their_own_that_may_be_reached(sign: float) -> None:
     path = line(0.0, 0.0, sign * 0.25)  # to 5 deg/s, always 0.5 deg/s2

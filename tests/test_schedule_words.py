@@ -87,8 +87,10 @@ def test_a_forced_pass_that_is_cut_says_both() -> None:
 # Windows and what is worth having
 
 
-@pytest.mark.parametrize(("from_s", "to_s"), [(599.0, 900.0), (-300.0, 1.0), (200.0, 300.0), (-10.0, 700.0)])
-def test_a_window_that_touches_a_pass_is_the_reason_with_its_times(from_s: float, to_s: float) -> None:
+@pytest.mark.parametrize(("from_s", "to_s"), [(609.0, 900.0), (-300.0, -59.0), (200.0, 300.0), (-10.0, 700.0)])
+def test_a_window_that_touches_a_pass_or_what_comes_before_and_after_it_is_the_reason_with_its_times(
+    from_s: float, to_s: float
+) -> None:
     rules = replace(
         RULES,
         windows=(Window(DAY - 900.0, DAY - 700.0, "early"), Window(DAY + from_s, DAY + to_s, "greasing")),
@@ -125,7 +127,7 @@ def test_a_pass_too_near_is_lost_to_its_neighbour_with_the_slew_between_their_en
     )
 
 
-@pytest.mark.parametrize(("rise_s", "gap"), [(601.0, "1"), (-601.0, "1")])
+@pytest.mark.parametrize(("rise_s", "gap"), [(601.0, "1"), (-601.0, "1"), (600.0, "0"), (-600.0, "0")])
 def test_passes_that_nearly_touch_have_hardly_a_gap(rise_s: float, gap: str) -> None:
     told = reasons([track("A", rise_s), track("B", 0.0, priority=9)])["A"]
     need_s = 70.0 + RULES.slew_s(160.0, 0.0)

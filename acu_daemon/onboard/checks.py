@@ -70,9 +70,9 @@ def check_axis(name: str, path: Path, limits: AxisLimits, time_s: Array) -> list
     """Range, rate, acceleration and joints of one axis."""
     angle, rate, acceleration = (path.value(time_s, k) for k in range(3))
     low, high = float(angle.min()), float(angle.max())
-    over = max(limits.min_deg - low, high - limits.max_deg)
-    nearest = low if limits.min_deg - low > high - limits.max_deg else high
-    edge = limits.min_deg if nearest == low else limits.max_deg
+    over, nearest, edge = max(
+        (limits.min_deg - low, low, limits.min_deg), (high - limits.max_deg, high, limits.max_deg)
+    )
     found = [Check(f"{name} range", nearest, edge, "deg", over <= _RANGE_DEG, f" ({low:.2f} to {high:.2f})")]
     for what, values, limit, unit in (
         ("rate", rate, limits.max_rate_deg_s, "deg/s"),

@@ -63,7 +63,7 @@ def _never(track: PassTrack, rules: StationRules) -> str:
     if next(slots_of(track, (), rules), None) is not None:
         return ""
     for one in rules.windows:
-        if one.from_tai_s < track.end_tai_s and track.start_tai_s < one.to_tai_s:
+        if one.from_tai_s < track.end_tai_s + rules.post_s and track.start_tai_s - rules.pre_s < one.to_tai_s:
             return f"{one.reason} {_clock(one.from_tai_s)} to {_clock(one.to_tai_s)}"
     turns_deg = track.turns_deg(track.start_tai_s, track.end_tai_s, rules.azimuth)
     most_s = max(track.useful_s(track.start_tai_s, track.end_tai_s, turn, rules.azimuth) for turn in turns_deg)
@@ -94,7 +94,7 @@ def _lost_text(track: PassTrack, chosen: Sequence[Slot], rules: StationRules, pl
         return f"lost to {whom}: both are up for {overlap_s:.0f} s"
     is_before = other.end_tai_s <= track.start_tai_s
     need_s = rules.pre_s + rules.post_s + _least_slew_s(track, other, rules, is_before=is_before)
-    return f"lost to {whom}: slew and preparation need {need_s:.0f} s, the gap is {-overlap_s:.0f} s"
+    return f"lost to {whom}: slew and preparation need {need_s:.0f} s, the gap is {abs(overlap_s):.0f} s"
 
 
 def _least_slew_s(track: PassTrack, other: Slot, rules: StationRules, *, is_before: bool) -> float:
