@@ -144,3 +144,21 @@ def test_a_square_mount_in_a_vacuum_reads_the_direction() -> None:
     az, el = AntennaModel().encoders_deg(123.4, 56.7)
     assert (float(az), float(el)) == (123.4, 56.7)
     assert {field.name for field in fields(MountAxes)} == set(TERMS)
+
+
+@pytest.mark.parametrize("model", [AntennaModel(), MODEL, AntennaModel(MOUNT)])
+@pytest.mark.parametrize("is_plunged", [False, True])
+@pytest.mark.parametrize(("az_rate", "el_rate"), [(0.8, 0.5), (-0.8, 0.5), (0.8, -0.5), (-0.8, -0.5)])
+def test_rates_are_those_at_which_the_angles_move_plunged_or_not(model, is_plunged, az_rate, el_rate) -> None:
+    step_s, range_m = 0.01, np.full(2, 9e5)
+    times = np.array([-0.5, 0.5]) * step_s
+    turned = model.with_rates_plunged if is_plunged else model.with_rates
+    az, el, _, _ = turned(
+        40.0 + az_rate * times, 70.0 + el_rate * times, range_m, np.full(2, az_rate), np.full(2, el_rate)
+    )
+    one = [np.array([value]) for value in (40.0, 70.0, 9e5, az_rate, el_rate)]
+    middle_az, middle_el, found_az, found_el = turned(*one)
+    assert wrap_180(float(az[1] - az[0])) / step_s == pytest.approx(float(found_az[0]), abs=1e-4)
+    assert float(el[1] - el[0]) / step_s == pytest.approx(float(found_el[0]), abs=1e-4)
+    assert (float(middle_el[0]) > 90.0) == is_plunged
+    assert abs(wrap_180(float(middle_az[0]) - (220.0 if is_plunged else 40.0))) < 1.0

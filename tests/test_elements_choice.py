@@ -16,6 +16,7 @@ from acu_daemon.assist.estimators.full.carry_over import CarryOver, carry_over_o
 from acu_daemon.assist.estimators.full.estimated_states import STATE_COUNT
 from acu_daemon.assist.settings import EstimatorSettings
 from acu_daemon.config.load import load_satellite, load_station
+from acu_daemon.edge import elements_store
 from acu_daemon.edge.elements_choice import ElementsSources, LastFit, choose_elements
 from acu_daemon.edge.elements_file import LoadedElements
 from acu_daemon.edge.elements_store import (
@@ -246,3 +247,15 @@ def test_a_fit_over_another_station_is_of_the_same_orbit_and_of_no_other_element
     fit = LastFit(seen, replace(site, station=replace(site.station, name="elsewhere")), EstimatorSettings())
     assert fit.corrects(choose(tmp_path).propagator, NOW_TAI_S + 60.0)  # the orbit is the same from everywhere
     assert not fit.corrects(Sgp4Propagator(NEWER), NOW_TAI_S + 60.0)
+
+
+def test_of_many_sets_the_newest_twelve_of_thirty_days_are_kept(tmp_path: Path) -> None:
+    days = [-31.0, -30.0, *(-29.0 + 0.5 * k for k in range(4)), *(-0.5 * k for k in range(9, -1, -1))]
+    sets = [replace(NEWER, epoch_tai_s=NEWER.epoch_tai_s + day * DAY_S) for day in days]
+    path = tmp_path / "25544.json"
+    elements_store._write(path, sets, URL)
+    assert [one.epoch_tai_s for one in read_sets(path, 25544)] == pytest.approx([one.epoch_tai_s for one in sets[-12:]])
+    elements_store._write(path, [*sets[:2], sets[-1]], URL)
+    assert [one.epoch_tai_s for one in read_sets(path, 25544)] == pytest.approx(
+        [sets[1].epoch_tai_s, NEWER.epoch_tai_s]
+    )

@@ -367,6 +367,43 @@ async def test_user_and_password_are_given_and_wrong_ones_are_tried_again_in_pea
             assert publisher.connect_count == 1
 
 
+class Forgetful:
+    """A broker that takes what is published and goes after each state; started again it has nothing."""
+
+    taken: ClassVar[list[list[str]]] = []
+
+    def __init__(self, *_: Any, **__: Any) -> None:
+        self._client = SimpleNamespace(on_disconnect=None, disconnect=lambda: None)
+        self.taken.append([])
+
+    async def __aenter__(self) -> "Forgetful":
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        return
+
+    async def publish(self, topic: str, *_: Any, **__: Any) -> None:
+        self.taken[-1].append(topic)
+        if topic.endswith("/state"):
+            raise aiomqtt.MqttError("gone")
+
+
+async def test_a_broker_that_was_started_again_is_told_everything_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mqtt_publisher.aiomqtt, "Client", Forgetful)
+    monkeypatch.setattr(Forgetful, "taken", [])
+    station = Station(passes=[{"satellite": "SCD-1"}])
+    publisher = MqttPublisher(BrokerAddress("127.0.0.1", 1), TOPICS, station.sources(), (0.05, 0.2))
+    for _ in range(2):
+        with pytest.raises(aiomqtt.MqttError):
+            await publisher._publish_until_gone()
+    assert publisher.connect_count == 2
+    before, again = Forgetful.taken
+    assert before == again
+    assert [topic for topic in again if topic.startswith(TOPICS.base)] == [
+        f"{TOPICS.base}/{what}" for what in ("availability", "schedule", "state", "availability")
+    ]
+
+
 class Losing:
     """A client that loses the first cancellation, as asyncio.wait_for of Python 3.11 does when an answer comes."""
 

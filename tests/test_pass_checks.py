@@ -81,6 +81,23 @@ async def test_a_no_go_is_told_and_tried_again_after_15_s_until_there_is_none() 
     assert not await desk.look(one, RISE + 200.0)
 
 
+async def test_what_clears_after_the_rise_lets_the_rest_of_the_pass_begin() -> None:
+    desk, one = Desk(), entry(1)
+    desk.answer = lambda: ["the door is open"]
+    checked_tai_s = RISE - 60.0
+    assert await desk.look(one, checked_tai_s)
+    for _ in range(6):
+        desk.checks.refuse(one, checked_tai_s)
+        assert not await desk.look(one, checked_tai_s + AGAIN_S - STEP_S)
+        checked_tai_s += AGAIN_S
+        assert await desk.look(one, checked_tai_s)
+    assert checked_tai_s > RISE
+    desk.answer = list
+    desk.checks.refuse(one, checked_tai_s)
+    assert await desk.look(one, checked_tai_s + AGAIN_S)
+    assert (desk.checks.no_go, desk.checks.may_begin(checked_tai_s + AGAIN_S)) == ("", True)
+
+
 async def test_a_no_go_is_of_its_own_pass_alone() -> None:
     desk, one, other = Desk(), entry(1), entry(2, RISE + 4000.0)
     desk.answer = lambda: ["the door is open"]

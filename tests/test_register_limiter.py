@@ -62,6 +62,16 @@ def test_registers_that_are_not_followed_hold_the_true_path_at_any_speed():
     assert not passed.is_held_back
 
 
+@pytest.mark.parametrize("is_followed", [True, False])
+@pytest.mark.parametrize(
+    ("az_deg", "el_deg"), [(0.0, 0.0), (30.0, 0.0), (-30.0, 0.0), (0.0, 20.0), (0.0, -20.0), (30.0, 20.0)]
+)
+def test_what_one_axis_alone_cannot_do_is_held_back_where_it_is_followed(az_deg, el_deg, is_followed):
+    wanted = Pointing(100.0 + az_deg, 45.0 + el_deg, 0.0, 0.0)
+    passed = limit(wanted, at(100.0, 45.0), 0.0, is_followed=is_followed, dt_s=DT_S, config=CONFIG)
+    assert passed.is_held_back == (is_followed and (az_deg, el_deg) != (0.0, 0.0))
+
+
 @pytest.mark.parametrize("bad", [nan, inf, -inf])
 def test_a_bad_azimuth_is_refused_with_a_reason_and_the_last_good_value_stays(bad):
     passed = limit(Pointing(bad, 45.0, 0.0, 0.0), at(100.0, 45.0), 0.0, is_followed=False, dt_s=DT_S, config=CONFIG)
