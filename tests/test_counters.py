@@ -1,12 +1,12 @@
 """What counts troubles in a row, or since they were told, begins anew once there was none."""
 
 import asyncio
-import threading
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from drained import drain
 from made_orbits import circular, site
 from structlog.testing import capture_logs
 from test_daemon_events import climb, events_named
@@ -123,11 +123,7 @@ def test_p6_a_latch_that_is_written_at_last_is_no_problem_any_more_and_a_new_one
 
     def see(text: str) -> str:
         keeper.see(text)
-        while writer.waiting_count or keeper._latest._is_waiting:
-            pass
-        is_done = threading.Event()
-        writer.put(is_done.set)
-        assert is_done.wait(PATIENT_S)
+        drain(writer)
         return keeper.problem
 
     with capture_logs() as logs:

@@ -4,6 +4,7 @@ import errno
 from pathlib import Path
 
 import pytest
+from drained import drain
 from structlog.testing import capture_logs
 from test_run_state import written
 
@@ -32,8 +33,7 @@ def see(directory: Path, *latches: str, name: str = LATCH) -> None:
     keeper = LatchKeeper(directory, writer, read_latch(directory, name), NoonClock(), name)
     for latch in latches:
         keeper.see(latch)
-        while writer.waiting_count or keeper._latest._is_waiting:
-            pass
+        drain(writer)
     assert writer.close(60.0)
 
 
@@ -115,8 +115,7 @@ def test_p6_what_could_not_be_written_is_written_at_a_later_tick(tmp_path: Path)
     with capture_logs() as logs:
         for _ in range(3):
             keeper.see(TEXT)
-            while writer.waiting_count or keeper._latest._is_waiting:
-                pass
+            drain(writer)
         writer.put(directory.mkdir)
         keeper.see(TEXT)
         assert writer.close(60.0)
@@ -130,8 +129,7 @@ def see_with_older(directory: Path, older: list[Path], *latches: str, is_left_ou
     keeper = LatchKeeper(directory, writer, first, NoonClock(), LATCH, older, is_left_out=is_left_out)
     for latch in latches:
         keeper.see(latch)
-        while writer.waiting_count or keeper._latest._is_waiting:
-            pass
+        drain(writer)
     assert writer.close(60.0)
 
 

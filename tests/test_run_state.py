@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from drained import drain
 from memories import remembering
 from structlog.testing import capture_logs
 from test_carry_over_file import CARRIED, FIT
@@ -142,8 +143,7 @@ def test_a_change_is_written_and_a_tick_without_one_is_not(tmp_path: Path) -> No
     state = remembering(track=TrackState.HOLD_FITTED, by_people=True, held=Held(), by_hand=BY_HAND)
     for _ in range(10):
         keeper.see(state)
-    while writer.waiting_count or keeper._latest._is_waiting:
-        pass
+    drain(writer)
     assert not (tmp_path / RUN_STATE).exists()
     keeper.offer(replace(FIT, at_tai_s=5.0))
     keeper.see(remembering(state, by_people=False))
@@ -160,8 +160,7 @@ def test_p10_a_full_disk_is_told_at_its_edges(tmp_path: Path) -> None:
 
     def see(track: TrackState) -> None:
         keeper.see(remembering(track=track))
-        while keeper._latest._is_waiting or writer.waiting_count:
-            pass
+        drain(writer)
 
     with capture_logs() as logs:
         see(TrackState.IDLE)
@@ -182,8 +181,7 @@ def test_p10_what_a_full_disk_refused_is_written_again_though_nothing_changes(tm
     def ticks(count: int) -> None:
         for _ in range(count):
             keeper.see(state)
-            while keeper._latest._is_waiting or writer.waiting_count:
-                pass
+            drain(writer)
 
     with capture_logs() as logs:
         ticks(1)

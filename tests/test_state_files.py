@@ -3,11 +3,11 @@
 import errno
 import json
 import re
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from drained import drain
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -172,8 +172,7 @@ def test_a_snapshot_is_written_once_in_ten_ticks_and_whole(tmp_path: Path) -> No
     seen = []
     for tick in range(1, 35):
         snapshots.write(Seen(tick))
-        while writer.waiting_count or (tick >= EVERY_TICKS and not (tmp_path / SNAPSHOT).exists()):
-            time.sleep(0.001)
+        drain(writer)
         if tick % EVERY_TICKS == EVERY_TICKS - 1 and tick > EVERY_TICKS:
             seen.append(json.loads((tmp_path / SNAPSHOT).read_text())["tick"])
     assert writer.close()
@@ -187,8 +186,7 @@ def test_a_snapshot_that_cannot_be_written_is_counted_and_stops_nothing(tmp_path
     snapshots = SnapshotFile(tmp_path / "gone", writer)
     for tick in range(3 * EVERY_TICKS):
         snapshots.write(Seen(tick))
-        while writer.waiting_count:
-            time.sleep(0.001)
+        drain(writer)
     assert writer.close()
     assert 1 <= snapshots.failed_count <= 3
 
