@@ -10,7 +10,6 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -63,12 +62,12 @@ def tle_over(station: Station, now_unix_s: float) -> tuple[str, str]:
     raise AssertionError("no orbit passes by")
 
 
-def wait_until(is_so: Callable[[], Any]) -> Any:
+def wait_until(is_so: Callable[[], Any], log: Path | None = None) -> Any:
     end_s = time.monotonic() + PATIENCE_S
     while True:
         if found := is_so():
             return found
-        assert time.monotonic() < end_s, "it never came true"
+        assert time.monotonic() < end_s, f"it never came true {log.read_text() if log else ''}"
         time.sleep(0.2)
 
 
@@ -78,6 +77,7 @@ class Screen:
 
     display: str
     environment: dict[str, str]
+    log: Path  # of Gpredict
 
     def windows(self) -> str:
         words = ["xdotool", "search", "--onlyvisible", "--name", "Gpredict", "getwindowname", "%@"]
@@ -93,26 +93,20 @@ class Screen:
 
 @contextlib.contextmanager
 def screen(home: Path) -> Iterator[Screen]:
-    for number in count(90):
-        display = f":{number}"
-        with (home / "xvfb.log").open("w") as log:
-            server = subprocess.Popen(
-                ["Xvfb", display, "-screen", "0", "1280x900x24", "-nolisten", "tcp"], stdout=log, stderr=log
-            )
-        end_s = time.monotonic() + PATIENCE_S
-        while server.poll() is None and not Path(f"/tmp/.X11-unix/X{number}").exists():
-            assert time.monotonic() < end_s
-            time.sleep(0.05)
-        time.sleep(0.3)
-        if server.poll() is None:
-            break
+    reading, writing = os.pipe()
+    words = ["Xvfb", "-displayfd", str(writing), "-screen", "0", "1280x900x24", "-nolisten", "tcp"]
+    with (home / "xvfb.log").open("w") as log, os.fdopen(reading) as told:
+        server = subprocess.Popen(words, stdout=log, stderr=log, pass_fds=[writing])
+        os.close(writing)
+        display = f":{told.readline().strip()}"  # a free one, once it can be used
+    assert display != ":", (home / "xvfb.log").read_text()
     kept = {key: value for key, value in os.environ.items() if not key.startswith("XDG_")}
     environment = kept | {"HOME": str(home), "DISPLAY": display, "NO_AT_BRIDGE": "1"}
     started = [server]
     try:
         with (home / "gpredict.log").open("w") as log:
             started.append(subprocess.Popen(["gpredict"], env=environment, stdout=log, stderr=log))
-        yield Screen(display, environment)
+        yield Screen(display, environment, home / "gpredict.log")
     finally:
         for process in reversed(started):
             process.send_signal(signal.SIGTERM)
@@ -160,7 +154,7 @@ def test_gpredict_engages_leads_the_antenna_along_its_pass_and_lets_it_go(tmp_pa
         wait_until(lambda: rig.state == "AUTOTRACK/FITTED")
         home = gpredict_home(tmp_path / "home", int(opened.rsplit(":", 1)[1]), tle)
         with screen(home) as shown:
-            wait_until(lambda: "Gpredict: Amateur" in shown.windows())
+            wait_until(lambda: "Gpredict: Amateur" in shown.windows(), shown.log)
             time.sleep(1.0)  # until it is drawn
             shown.click(MENU)
             time.sleep(0.5)
