@@ -20,6 +20,7 @@ from acu_daemon.cli import check, own_daemon
 from acu_daemon.cli.check_finding import NO_GO, Finding
 from acu_daemon.drivers.sa3842.codec import CMD_OF, CommandDecoder, encode_reply
 from acu_daemon.drivers.sa3842.messages import Command, Faults, Identity, Nak, Reply, Status
+from acu_daemon.drivers.sa3842.sa3842_driver import Sa3842Driver
 from acu_daemon.drivers.sa3842.status_block import decode_status
 from acu_daemon.edge.clock import SystemClock
 from acu_daemon.edge.control_socket import SOCKET
@@ -31,6 +32,7 @@ READY = replace(
     decode_status("0" * 23), mode=AcuMode.STANDBY, is_remote_enabled=True, is_receiver_valid=True, agc_db=7.5
 )
 PLAIN = Identity("3842", "10")
+PATIENCE_S = 60.0
 
 
 class SmallAcu:
@@ -68,11 +70,18 @@ class SmallAcu:
 
 @contextlib.contextmanager
 def acu(status: Status | None = READY, identity: Identity = PLAIN, faults: Faults | None = None) -> Iterator[SmallAcu]:
+    """An ACU; one that answers is waited for, however busy the machine is."""
     made = SmallAcu(status, identity, faults or Faults())
-    try:
-        yield made
-    finally:
-        made.close()
+    with pytest.MonkeyPatch.context() as patch:
+        if status is not None:
+            patch.setattr("acu_daemon.cli.check_acu.ACU_S", PATIENCE_S)
+            patch.setattr("acu_daemon.edge.tcp.CONNECT_TIMEOUT_S", PATIENCE_S)
+            slow = replace(Sa3842Driver.capabilities, reply_deadline_s=PATIENCE_S / 2.0)
+            patch.setattr(Sa3842Driver, "capabilities", slow)
+        try:
+            yield made
+        finally:
+            made.close()
 
 
 class SetClock(SystemClock):
