@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-FLOOR_PERCENT = {"lines": 95.1, "branches": 88.2}  # half a point below what was measured: raise it, never lower it
+FLOOR_PERCENT = {"lines": 95.2, "branches": 88.7}  # half a point below what was measured: raise it, never lower it
 PARTS = tuple(FLOOR_PERCENT)
 REAL_PASSES = Path(__file__).resolve().parents[2] / "shared" / "data"
 
