@@ -135,7 +135,8 @@ class BrouwerPropagator:
         self._refuse_infinite(tai_s)
         mean = self._mean_of([self.corrected(one) for one in corrections], tai_s)
         r_m, v_m_s = states_of_mean(mean, self.short_period)
-        return r_m.reshape(-1, tai_s.size, 3), v_m_s.reshape(-1, tai_s.size, 3)
+        shape = len(corrections), tai_s.size, 3
+        return r_m.reshape(shape), v_m_s.reshape(shape)
 
     def mean_elements(self, tai_s: Array) -> OsculatingElements:
         """The mean elements with their secular motion at the times (N,)."""

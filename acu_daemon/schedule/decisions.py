@@ -62,9 +62,8 @@ def _never(track: PassTrack, rules: StationRules) -> str:
         return f"culminates at {top_deg:.1f} deg, min_culmination_deg is {least_deg:g}"
     if next(slots_of(track, (), rules), None) is not None:
         return ""
-    for one in rules.windows:
-        if one.from_tai_s < track.end_tai_s + rules.post_s and track.start_tai_s - rules.pre_s < one.to_tai_s:
-            return f"{one.reason} {_clock(one.from_tai_s)} to {_clock(one.to_tai_s)}"
+    if (window := rules.window_in_the_way(track.start_tai_s, track.end_tai_s)) is not None:
+        return f"{window.reason} {_clock(window.from_tai_s)} to {_clock(window.to_tai_s)}"
     turns_deg = track.turns_deg(track.start_tai_s, track.end_tai_s, rules.azimuth)
     most_s = max(track.useful_s(track.start_tai_s, track.end_tai_s, turn, rules.azimuth) for turn in turns_deg)
     return f"useful for {most_s:.0f} s only, min_useful_s is {track.rules.min_useful_s:g}"

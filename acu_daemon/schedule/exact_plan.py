@@ -174,9 +174,7 @@ def _are_near(track: PassTrack, other: PassTrack, gap_s: float) -> bool:
 
 
 def _on_turns(track: PassTrack, start_tai_s: float, end_tai_s: float, rules: StationRules) -> Iterator[Slot]:
-    if any(
-        one.from_tai_s < end_tai_s + rules.post_s and start_tai_s - rules.pre_s < one.to_tai_s for one in rules.windows
-    ):
+    if rules.window_in_the_way(start_tai_s, end_tai_s) is not None:
         return
     start_deg, end_deg = track.at(start_tai_s), track.at(end_tai_s)
     for offset_deg in track.turns_deg(start_tai_s, end_tai_s, rules.azimuth):

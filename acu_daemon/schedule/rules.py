@@ -76,6 +76,12 @@ class StationRules:
         """From a pass to another one, from any angle to any other."""
         return self.pre_s + self.post_s + self.slew_s(self._range(self.azimuth), self._range(self.elevation))
 
+    def window_in_the_way(self, start_tai_s: float, end_tai_s: float) -> Window | None:
+        """The first window that a pass of these times runs into, with what comes before and after it."""
+        first_tai_s, last_tai_s = start_tai_s - self.pre_s, end_tai_s + self.post_s
+        met = (one for one in self.windows if one.from_tai_s < last_tai_s and first_tai_s < one.to_tai_s)
+        return next(met, None)
+
     def slew_s(self, az_deg: float, el_deg: float) -> float:
         """How long both axes need for so far a way, standing to standing."""
         return max(way_s(az_deg, self.azimuth), way_s(el_deg, self.elevation))

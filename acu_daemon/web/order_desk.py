@@ -1,7 +1,7 @@
 """What people at a page may order, and what each order comes to: one line of the same verbs as the command line's.
 
-STOP asks for nothing: no token, no lease, no unlocking.  All else is sealed with the token; an alarm is acknowledged
-from a locked page too, and every other verb asks for one that its user has unlocked, and that has the write lease.
+STOP asks for nothing: no token, no lease, no unlocking.  All else is sealed with the token.  A verb asks for a page
+that its user has unlocked, and that has the write lease; an alarm is acknowledged from a locked page too.
 """
 
 import math
